@@ -160,6 +160,22 @@ TEST(LiveLog, AnOvertakenPacketTakesNothingBack) {
   EXPECT_EQ(link.taken().size(), 150U);
 }
 
+// A copy that is slower than the session for longer than the host remembers what it sent: once it is faster it has all.
+TEST(LiveLog, WhoWasFarBehindCatchesUp) {
+  Link link(1, settings(40), JoinRole::watcher, {10, 0, 0, 0});
+  link.run(100);
+  std::uint64_t taken = 0;
+  const auto step = [&](int most) {
+    link.tick();
+    link.run(1);
+    for (int n = 0; n < most && link.guest.next(); ++n) ++taken;
+  };
+  for (int t = 0; t < 40'000; ++t) step(t % 3 == 0 ? 1 : 0);
+  ASSERT_LT(taken + 20'000, link.ticks) << "it is not far behind";
+  for (int t = 0; t < 20'000 && taken < link.ticks; ++t) step(5);
+  EXPECT_EQ(link.guest.next_tick() + 30 > link.ticks, true) << link.guest.next_tick() << " of " << link.ticks;
+}
+
 // More at once than a packet holds: ticks go on, with the first of it.
 TEST(LiveLog, MoreActionsInATickThanFitHoldNothingUp) {
   Link link(2);

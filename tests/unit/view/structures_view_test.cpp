@@ -197,14 +197,21 @@ TEST(StructuresView, ClearLetsEveryOtherPixelThroughAndHiddenAll) {
   EXPECT_EQ(view.all()[0].value, 1);
 }
 
-// A tube along x that runs out of the labels at both ends: it fades there, also where it is clear. One that ends before
-// stays whole to its end, and so does one beside the border.
-TEST(StructuresView, WhatRunsOutOfTheLabelsFadesTowardsTheirBorder) {
-  const auto drawn = [](const std::function<double(Vec3)>& body, StructureLook look) {
+// A tube along x that runs out of the bone's grid at both ends: it fades there, also where it is clear. One that ends
+// before stays whole to its end, and so does one whose labels were cropped, or that is labelled beyond the bone.
+TEST(StructuresView, WhatRunsOutOfTheBoneFadesTowardsItsBorder) {
+  const auto drawn = [](const std::function<double(Vec3)>& body, StructureLook look, double bone_half_mm = 6) {
     Labels labels = labelled(6, {0.5, 0.5, 0.5}, body);
     labels.structures = {{1, "tube", {255, 0, 0}}};
     const StructureMap map(labels, 2);
     Seen seen(map);
+    Frame bone;
+    for (std::size_t a = 0; a < 3; ++a) {
+      bone.spacing_mm[a] = 0.3;
+      bone.dims[a] = static_cast<int>(2 * bone_half_mm / 0.3);
+      bone.origin_mm[a] = labels.frame.origin_mm[a] + 5.75 - bone_half_mm + 0.15;
+    }
+    seen.view.fade_at_border(bone);
     if (look != StructureLook::solid) {
       seen.view.show(0, StructureLook::hidden);
       seen.view.show(0, look);
@@ -230,7 +237,9 @@ TEST(StructuresView, WhatRunsOutOfTheLabelsFadesTowardsTheirBorder) {
   };
   const std::vector<double> out = drawn(tube(100), StructureLook::solid),
                             clear = drawn(tube(100), StructureLook::clear),
-                            whole = drawn(tube(4.4), StructureLook::solid);
+                            whole = drawn(tube(4.4), StructureLook::solid),
+                            cropped = drawn(tube(100), StructureLook::solid, 15),
+                            beyond = drawn(tube(100), StructureLook::solid, 4);
   for (std::size_t mm = 0; mm < out.size(); ++mm)
     std::printf("%zu mm from the middle: %.2f drawn, clear %.2f; of one that ends before %.2f\n", mm, out[mm],
                 clear[mm], whole[mm]);
@@ -244,6 +253,10 @@ TEST(StructuresView, WhatRunsOutOfTheLabelsFadesTowardsTheirBorder) {
   EXPECT_LT(out[5], 0.12);
   EXPECT_NEAR(clear[0], 0.5, 0.05);
   for (std::size_t mm = 0; mm < 4; ++mm) EXPECT_EQ(whole[mm], 1) << mm;
+  for (std::size_t mm = 0; mm < 5; ++mm) {
+    EXPECT_EQ(cropped[mm], 1) << mm;
+    EXPECT_EQ(beyond[mm], 1) << mm;
+  }
 }
 
 // The left half of a ball is uncertain: it has bars of a paler colour, the right half has none.

@@ -138,6 +138,9 @@ void RehearsalWindow::show_bone(Rehearsal& rehearsal) {
   tools_ = std::make_unique<SceneTools>(renderer_);
   if (!structures_ && rehearsal.structures() != nullptr) {  // the same in all sessions
     structures_ = std::make_unique<StructuresView>(renderer_, *rehearsal.structures());
+    rehearsal.look([&](const World& world, SceneReaders&) {
+      structures_->fade_at_border(world.bodies().front().body->bone.frame());
+    });
     if (uncertainty_ && !uncertainty_->structures.empty())
       structures_->hatch(*uncertainty_, uncertainty_->structures.back().value);
   }

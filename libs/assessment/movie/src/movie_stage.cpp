@@ -1,9 +1,11 @@
 #include "movie_stage.h"
 
 #include <vtkGenericOpenGLRenderWindow.h>
+#include <utility>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/slices.h"
@@ -31,6 +33,8 @@ Picture MovieStage::draw(SessionScene& scene, const ScopeView& view, std::size_t
   window_.make_current();
   scene.refresh();
   world_view_->update(*scene.world(), scene.readers(), WorldView::Work::all);
+  if (structures_ && !std::exchange(faded_, true))
+    structures_->fade_at_border(scene.world()->bodies().front().body->bone.frame());
   const auto solid = [&](Vec3 p) { return is_bone(*scene.world(), p); };
   for (std::size_t h = 0; h < hands_.size(); ++h) {
     if (h < hands && scene.in_use(h)) {

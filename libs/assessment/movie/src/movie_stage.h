@@ -34,6 +34,7 @@ class MovieStage {
   vtkNew<vtkRenderer> renderer_;
   std::unique_ptr<WorldView> world_view_;
   std::unique_ptr<StructuresView> structures_;
+  bool faded_ = false;  // those of them that run out of the bone
   std::array<std::unique_ptr<InstrumentView>, kMaxHands> hands_;
   bool deep_ = false;
 };

@@ -36,19 +36,36 @@ double area_mm2_of(const TriMesh& mesh) {
   return twice / 2;
 }
 
+// Of the triangles around, where the mesh has none: they tell the sides of a thin wall apart.
+std::vector<std::array<float, 3>> normals_of(const TriMesh& mesh) {
+  if (mesh.normals.size() == mesh.points_mm.size()) return mesh.normals;
+  std::vector<Vec3> sum(mesh.points_mm.size());
+  for (const auto& t : mesh.triangles) {
+    const Vec3 a = from_floats(mesh.points_mm[t[0]]);
+    const Vec3 n = cross(from_floats(mesh.points_mm[t[1]]) - a, from_floats(mesh.points_mm[t[2]]) - a);
+    for (const std::uint32_t p : t) sum[p] += n;
+  }
+  std::vector<std::array<float, 3>> normals;
+  normals.reserve(sum.size());
+  for (const Vec3& n : sum) normals.push_back(to_floats(length(n) > 0 ? normalized(n) : n));
+  return normals;
+}
+
 // Number of a cell for each point: those in one cube of this edge that face the same way. Sides of a thin wall or a
 // wire face other ways, so they stay apart however large the cube is, where common simplifications lose them.
-std::vector<std::uint32_t> cells_of(const TriMesh& mesh, double edge_mm, std::size_t& count) {
+std::vector<std::uint32_t> cells_of(const TriMesh& mesh, std::span<const std::array<float, 3>> normals, double edge_mm,
+                                    std::size_t& count) {
   std::unordered_map<std::uint64_t, std::uint32_t> cells;
   cells.reserve(mesh.points_mm.size() / 3);
   std::vector<std::uint32_t> cell(mesh.points_mm.size());
-  const bool normals = mesh.normals.size() == cell.size();
   for (std::size_t p = 0; p < cell.size(); ++p) {
     std::uint64_t key = 0, faces = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      const auto at = static_cast<std::int64_t>(std::floor(static_cast<double>(mesh.points_mm[p][a]) / edge_mm));
+      constexpr double kFar = 1e9;  // cells: a stray point far off is in one with others
+      const auto at = static_cast<std::int64_t>(
+          std::clamp(std::floor(static_cast<double>(mesh.points_mm[p][a]) / edge_mm), -kFar, kFar));
       key = key << 20 | static_cast<std::uint64_t>(at & 0xfffff);
-      if (normals && mesh.normals[p][a] < 0) faces |= std::uint64_t{1} << a;
+      if (normals[p][a] < 0) faces |= std::uint64_t{1} << a;
     }
     cell[p] = cells.try_emplace(key << 3 | faces, static_cast<std::uint32_t>(cells.size())).first->second;
   }
@@ -69,9 +86,10 @@ PictureMesh mesh_for_pictures(const TriMesh& mesh) {
     return made;
   }
   // Of cubes as large as a smooth surface needs for so many triangles: about four for each of a cube's faces.
+  const std::vector<std::array<float, 3>> normals = normals_of(mesh);
   std::size_t count = 0;
-  const std::vector<std::uint32_t> cell =
-      cells_of(mesh, std::sqrt(4 * area_mm2_of(mesh) / static_cast<double>(kTriangles)), count);
+  const std::vector<std::uint32_t> cell = cells_of(
+      mesh, normals, std::max(1e-6, std::sqrt(4 * area_mm2_of(mesh) / static_cast<double>(kTriangles))), count);
   // Of each its point that is nearest to the middle of all.
   std::vector<Vec3> middle(count);
   std::vector<double> members(count);
@@ -88,14 +106,13 @@ PictureMesh mesh_for_pictures(const TriMesh& mesh) {
   for (const auto& [off, p] : nearest) {
     made.point.push_back(p);
     made.mesh.points_mm.push_back(mesh.points_mm[p]);
-    if (mesh.normals.size() == points) made.mesh.normals.push_back(mesh.normals[p]);
+    made.mesh.normals.push_back(normals[p]);
   }
   for (const auto& t : mesh.triangles) {
     const std::uint32_t a = cell[t[0]], b = cell[t[1]], c = cell[t[2]];
     if (a == b || b == c || c == a) continue;
     made.mesh.triangles.push_back({a, b, c});
     // One that came to lie with its back outside would be lit as the other side: a dark speck.
-    if (made.mesh.normals.empty()) continue;
     const auto at = [&](std::uint32_t n) { return from_floats(made.mesh.points_mm[n]); };
     const auto out = [&](std::uint32_t n) { return from_floats(made.mesh.normals[n]); };
     if (dot(cross(at(b) - at(a), at(c) - at(a)), out(a) + out(b) + out(c)) < 0)

@@ -76,29 +76,29 @@ std::vector<std::uint32_t> sizes_of_parts(const TriMesh& mesh) {
   return together;
 }
 
-// For each point how much of it is drawn, 0 to 1; empty: the structure ends nowhere at the border of the labels.
-std::vector<float> faded_at_border(const TriMesh& mesh, const Frame& labels) {
-  constexpr double kAtBorder = 1.5, kGoneMm = 0.5;  // voxels: half of one, and what smoothing rounds off
-  std::array<std::vector<double>, 6> to_side;       // mm
+// For each point how much of it is drawn, 0 to 1; empty: the structure ends nowhere at the border of the data.
+std::vector<float> faded_at(const TriMesh& mesh, const Frame& data) {
+  constexpr double kAtBorder = 1.5, kGone = 0.125;  // voxels: half of one, and what smoothing rounds off; of the fade
+  std::array<std::vector<double>, 6> to_side;       // 0 at the border, 1 where the fade begins
   for (std::size_t side = 0; side < 6; ++side) {
     const std::size_t a = side / 2;
-    bool ends = false;
+    const double spacing = data.spacing_mm[a], fade_mm = std::min(StructuresView::kFadeMm, data.dims[a] * spacing / 6);
+    bool ends = false, goes_on = false;
     for (const auto& p : mesh.points_mm) {
-      const double at = labels.index_from_world(from_floats(p))[a];
-      const double voxels = side % 2 == 0 ? at + 0.5 : labels.dims[a] - 0.5 - at;
+      const double at = data.index_from_world(from_floats(p))[a];
+      const double voxels = side % 2 == 0 ? at + 0.5 : data.dims[a] - 0.5 - at;
       ends = ends || voxels < kAtBorder;
-      to_side[side].push_back(voxels * labels.spacing_mm[a]);
+      goes_on = goes_on || voxels < -kAtBorder;
+      to_side[side].push_back(voxels * spacing / fade_mm);
     }
-    if (!ends) to_side[side].clear();
+    if (!ends || goes_on) to_side[side].clear();
   }
   std::vector<float> drawn;
-  for (const auto& mm : to_side) {
-    if (mm.empty()) continue;
-    if (drawn.empty()) drawn.assign(mm.size(), 1.0F);
-    for (std::size_t p = 0; p < mm.size(); ++p) {
-      const double t = std::clamp((mm[p] - kGoneMm) / (StructuresView::kFadeMm - kGoneMm), 0.0, 1.0);
-      drawn[p] = std::min(drawn[p], static_cast<float>(t));
-    }
+  for (const auto& share : to_side) {
+    if (share.empty()) continue;
+    if (drawn.empty()) drawn.assign(share.size(), 1.0F);
+    for (std::size_t p = 0; p < share.size(); ++p)
+      drawn[p] = std::min(drawn[p], static_cast<float>(std::clamp((share[p] - kGone) / (1 - kGone), 0.0, 1.0)));
   }
   return drawn;
 }
@@ -120,8 +120,8 @@ void draw_share_of_points(vtkActor* actor, const std::vector<float>& share) {
 // Dots by a number of each pixel that has nothing to do with the patterns of clear structures: interleaved gradient
 // noise (J. Jimenez, Next Generation Post Processing in Call of Duty, SIGGRAPH 2014).
 void leave_out_dots(vtkShaderProperty* shader) {
-  shader->AddFragmentShaderReplacement("//VTK::Normal::Dec", true,
-                                       "//VTK::Normal::Dec\nin float drawnShareVSOutput;\n", false);
+  shader->AddFragmentShaderReplacement("//VTK::Normal::Dec", true, "//VTK::Normal::Dec\nin float drawnShareVSOutput;\n",
+                                       false);
   shader->AddFragmentShaderReplacement(
       "//VTK::Color::Impl", true,
       "//VTK::Color::Impl\n"
@@ -194,11 +194,6 @@ StructuresView::StructuresView(vtkRenderer* renderer, const StructureMap& map)
     one.actor = make_bone_actor(to_vtk(*one.surface));
     const auto c = map.colour_of(one.value);
     one.actor->GetProperty()->SetColor(c[0], c[1], c[2]);
-    if (const std::vector<float> share = faded_at_border(*one.surface, map.label_frame()); !share.empty()) {
-      one.fades = true;
-      draw_share_of_points(one.actor, share);
-      leave_out_dots(one.actor->GetShaderProperty());
-    }
     renderer_->AddActor(one.actor);
     for (const Structure& structure : map.structures())
       if (structure.value == one.value) one.proposed = structure.within_mm > 0;
@@ -207,6 +202,17 @@ StructuresView::StructuresView(vtkRenderer* renderer, const StructureMap& map)
 
 StructuresView::~StructuresView() {
   for (const One& one : all_) renderer_->RemoveActor(one.actor);
+}
+
+void StructuresView::fade_at_border(const Frame& bone) {
+  for (One& one : all_) {
+    if (one.fades) continue;
+    const std::vector<float> share = faded_at(*one.surface, bone);
+    if (share.empty()) continue;
+    one.fades = true;
+    draw_share_of_points(one.actor, share);
+    leave_out_dots(one.actor->GetShaderProperty());
+  }
 }
 
 void StructuresView::show(std::size_t number, StructureLook look) {

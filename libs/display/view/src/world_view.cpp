@@ -308,6 +308,7 @@ Picture draw_world(const World& world, SceneReaders& readers, const StructureMap
   std::optional<StructuresView> at_risk;
   if (structures != nullptr) at_risk.emplace(renderer, *structures);
   view.update(world, readers);
+  if (at_risk) at_risk->fade_at_border(world.bodies().front().body->bone.frame());
   if (soft != nullptr) view.update_soft(*soft);
   look_at(renderer, p.centre_mm, p.radius_mm, p.eye);
   set_depth(renderer, {true, 1});

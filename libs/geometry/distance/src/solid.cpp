@@ -100,28 +100,62 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
         layers[edges[i].layer].net == layers[edges[i + 1].layer].net)
       join_sets(parent, edges[i].layer, edges[i + 1].layer);
   }
-  std::map<std::uint32_t, std::pair<std::uint32_t, double>> largest;  // of each patch
+  struct Patch {
+    std::vector<std::uint32_t> layers;
+    std::uint32_t largest = 0;
+    double most = -1;
+    Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+    bool closed = true;  // by itself: nothing outside of its box is within it
+  };
+  std::map<std::uint32_t, Patch> patches;
   for (std::uint32_t s = 0; s < layers.size(); ++s) {
     const double area =
         length(cross(corner(layers[s], 1) - corner(layers[s], 0), corner(layers[s], 2) - corner(layers[s], 0)));
-    auto& [which, most] = largest.try_emplace(root_of(parent, s), s, -1.0).first->second;
-    if (area > most) which = s, most = area;
+    Patch& patch = patches[root_of(parent, s)];
+    patch.layers.push_back(s);
+    if (area > patch.most) patch.largest = s, patch.most = area;
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        patch.lo[axis] = std::min(patch.lo[axis], corner(layers[s], i)[axis]);
+        patch.hi[axis] = std::max(patch.hi[axis], corner(layers[s], i)[axis]);
+      }
+    }
+  }
+  for (std::size_t i = 0, j = 0; i < edges.size(); i = j) {
+    for (j = i + 1; j < edges.size() && edges[j].a == edges[i].a && edges[j].b == edges[i].b;) ++j;
+    const bool joined = j - i == 2 && edges[i].forward != edges[i + 1].forward &&
+                        layers[edges[i].layer].net == layers[edges[i + 1].layer].net;
+    for (std::size_t e = i; !joined && e < j; ++e) patches.at(root_of(parent, edges[e].layer)).closed = false;
   }
   enum class Verdict : std::uint8_t { drop, keep, turn };
   std::map<std::uint32_t, Verdict> of_patch;
-  for (const auto& [patch, found] : largest) {
+  for (const auto& [number, patch] : patches) {
     context.check_cancelled();
-    const Layer& own = layers[found.first];
+    const Layer& own = layers[patch.largest];
     const Vec3 p = corner(own, 0) * 0.37 + corner(own, 1) * 0.33 + corner(own, 2) * 0.30;
+    // By more than rounding: faces that lie on each other are looked at.
+    const auto apart_from = [&](const Patch& other) {
+      bool outside = false;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double slack = 1e-9 * (std::abs(other.lo[axis]) + std::abs(other.hi[axis]) + std::abs(p[axis]));
+        outside = outside || p[axis] < other.lo[axis] - slack || p[axis] > other.hi[axis] + slack;
+      }
+      return outside;
+    };
     double others = 0;
-    for (std::uint32_t s = 0; s < layers.size(); ++s) {
-      if (s != found.first && layers[s].net != 0)
-        others +=
-            layers[s].net * corner_solid_angle(corner(layers[s], 0), corner(layers[s], 1), corner(layers[s], 2), p);
+    for (const auto& [its_number, other] : patches) {
+      if (its_number != number && other.closed && apart_from(other)) continue;
+      for (const std::uint32_t s : other.layers) {
+        if (s != patch.largest && layers[s].net != 0)
+          others +=
+              layers[s].net * corner_solid_angle(corner(layers[s], 0), corner(layers[s], 1), corner(layers[s], 2), p);
+      }
     }
     const double behind = others + own.net / 2.0, before = others - own.net / 2.0;
     const auto inside = [](double w) { return std::abs(w) > 0.5; };
-    of_patch[patch] = inside(behind) == inside(before) ? Verdict::drop : inside(behind) ? Verdict::keep : Verdict::turn;
+    of_patch[number] = inside(behind) == inside(before) ? Verdict::drop
+                       : inside(behind)                 ? Verdict::keep
+                                                        : Verdict::turn;
   }
   result.soup.triangles.clear();
   for (std::uint32_t s = 0; s < layers.size(); ++s) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 
 #include "handshake.h"
 #include "osteo/network/tutor/live.h"
@@ -175,7 +176,10 @@ void LiveHost::hear(Peer& peer, const HandPacket& p, std::int64_t now_us) {
 void LiveHost::hear_progress(Peer& peer, const HandPacket& p, std::int64_t now_us) {
   const std::uint64_t ticks = log_.size() / hands_;
   if (p.next_tick <= ticks) {
-    if (p.next_tick < peer.next_tick) peer.sent_to = p.next_tick;  // it begins again
+    if (p.next_tick < peer.next_tick) {  // it begins again
+      peer.sent_to = p.next_tick;
+      peer.on_way.clear();
+    }
     peer.next_tick = p.next_tick;
     std::erase_if(peer.on_way, [&](const auto& sent) { return sent.second.end <= p.next_tick; });
   }
@@ -226,15 +230,14 @@ LogPacket LiveHost::log_from(std::uint64_t tick) const {
   return p;
 }
 
-// Whether the first tick that is missing there was sent, and each time longer ago than the way takes: it was lost.
+// Whether the first tick that is missing there was sent, and each time longer ago than the way takes: it was lost. Of
+// what was sent and is not known any more nothing comes either.
 bool LiveHost::overdue(const Peer& peer, std::int64_t patience_us, std::int64_t now_us) {
-  bool sent = false;
+  if (peer.next_tick >= peer.sent_to) return false;
   for (auto at = peer.on_way.begin(); at != peer.on_way.end() && at->first <= peer.next_tick; ++at) {
-    if (at->second.end <= peer.next_tick) continue;
-    if (now_us - at->second.at_us <= patience_us) return false;
-    sent = true;
+    if (at->second.end > peer.next_tick && now_us - at->second.at_us <= patience_us) return false;
   }
-  return sent;
+  return true;
 }
 
 std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
@@ -251,7 +254,9 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
     };
     const auto send_log = [&](const LogPacket& log) {
       const std::uint64_t end = log.first_tick + log.samples.size() / hands_;
-      if (p.on_way.size() < kMaxOnWay) p.on_way[log.first_tick] = {end, now_us};
+      p.on_way[log.first_tick] = {end, now_us};
+      // Of one that takes nothing, those that it needs first are known; the rest is overdue when it comes to them.
+      if (p.on_way.size() > kMaxOnWay) p.on_way.erase(std::prev(p.on_way.end()));
       send(log);
       return end;
     };

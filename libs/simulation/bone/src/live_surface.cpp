@@ -146,6 +146,7 @@ std::span<const std::uint32_t> LiveSurface::settle() {
 }
 
 void shade_mesh(TriMesh& mesh, const BrickGrid& bone, const Context& context) {
+  if (mesh.normals.size() != mesh.points_mm.size()) return;
   const ShadingField field(bone, context.threads);
   const Frame& frame = bone.frame();
   const Mat3 to_index = transposed(frame.direction);
@@ -154,7 +155,8 @@ void shade_mesh(TriMesh& mesh, const BrickGrid& bone, const Context& context) {
     for (const double aside : {0.0, -1.0, 1.0}) {
       for (int n = 0; n < 8; ++n) {
         const auto cell = [&](double at, int bit) {
-          return static_cast<int>(std::floor(at + ((n >> bit & 1) != 0 ? aside : 0.0))) >> 3;
+          constexpr double kFar = 1e9;  // beyond any grid
+          return static_cast<int>(std::clamp(std::floor(at + ((n >> bit & 1) != 0 ? aside : 0.0)), -kFar, kFar)) >> 3;
         };
         const std::uint32_t b = bone.find_brick(cell(x.x, 0), cell(x.y, 1), cell(x.z, 2));
         if (b != BrickGrid::kNone) return b;

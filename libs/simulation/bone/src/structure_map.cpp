@@ -199,7 +199,6 @@ StructureMap::StructureMap(const Labels& labels, double reach_mm, const Context&
     : reach_mm_(reach_mm), structures_(labels.structures) {
   const Vec3 h = labels.frame.spacing_mm;
   spacing_mm_ = {std::min({h.x, h.y, h.z}), std::max({h.x, h.y, h.z})};
-  frame_ = labels.frame;
   using Box = std::array<std::array<int, 2>, 3>;
   constexpr int kMany = std::numeric_limits<int>::max();
   std::array<Box, 256> boxes;

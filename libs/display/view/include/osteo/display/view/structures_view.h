@@ -31,10 +31,8 @@ enum class StructureLook : int { solid, clear, hidden };
 
 class StructuresView {
  public:
-  /// Smooths every structure of the map, half a label voxel at most, in parallel. All are solid at first. One that
-  /// reaches the border of the labels goes on beyond it: its last kFadeMm are left out dot by dot, up to its end, which
-  /// is none in the patient. The renderer must outlive this.
-  static constexpr double kFadeMm = 4;
+  /// Smooths every structure of the map, half a label voxel at most, in parallel. All are solid at first. The renderer
+  /// must outlive this.
   StructuresView(vtkRenderer* renderer, const StructureMap& map);
   ~StructuresView();
   StructuresView(const StructuresView&) = delete;
@@ -45,7 +43,7 @@ class StructuresView {
     std::shared_ptr<const TriMesh> surface;
     StructureLook look = StructureLook::solid;
     vtkSmartPointer<vtkActor> actor;
-    bool fades = false;     ///< it reaches the border of the labels
+    bool fades = false;     ///< it reaches the border of the bone's grid
     bool proposed = false;  ///< a network drew it that knows how far off it may be, and no hand has changed it
   };
   /// In the order of the map's values().
@@ -53,6 +51,11 @@ class StructuresView {
   /// A clear one is screen-door: every other pixel of it is left out, in one of four patterns by its number, so nothing
   /// has to be sorted, peeled or drawn twice. `number` in all().
   void show(std::size_t number, StructureLook look);
+  /// A structure that reaches the border of `bone` goes on beyond it in the patient: its last kFadeMm, but no more than
+  /// a sixth of the bone's width, are left out dot by dot up to its end. What ends elsewhere, as at the border of
+  /// labels that were cropped, stays whole, and so does what is labelled beyond the bone.
+  static constexpr double kFadeMm = 4;
+  void fade_at_border(const Frame& bone);
   /// Of structures that are still as proposed, hatches what lies at voxels of that value or a larger one, as where a
   /// network is not sure of a boundary: bars of 0.8 mm in a paler colour, which are of the surface and turn with it.
   /// Values may lie in another grid than the map's.

@@ -64,8 +64,8 @@ class LiveSurface {
 };
 
 /// Normals as those of a shaded LiveSurface, for a mesh of the bone's surface or of some of its points, which has
-/// normals of its own. Those stay where the bone has no surface to shade by. Costs less than half of making the
-/// surface again.
+/// normals of its own: one without is left alone. Those stay where the bone has no surface to shade by. Costs less than
+/// half of making the surface again.
 void shade_mesh(TriMesh& mesh, const BrickGrid& bone, const Context& context);
 
 /// Content hash of points and triangles.

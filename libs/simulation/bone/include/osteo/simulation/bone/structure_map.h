@@ -64,8 +64,6 @@ class StructureMap {
   [[nodiscard]] const TriMesh& face(std::size_t number) const { return parts_[number].face; }
   /// Of the labels, the finest and the coarsest of the three.
   [[nodiscard]] std::array<double, 2> label_spacing_mm() const { return spacing_mm_; }
-  /// Of the labels: what reaches its border goes on beyond it, unseen.
-  [[nodiscard]] const Frame& label_frame() const { return frame_; }
   /// Red, green, blue, 0 to 1: the map's own, or one of a fixed row.
   [[nodiscard]] std::array<double, 3> colour_of(std::uint8_t structure) const;
   [[nodiscard]] std::string name_of(std::uint8_t structure) const;  ///< "structure 3" where the map has no name
@@ -97,7 +95,6 @@ class StructureMap {
   std::vector<std::uint8_t> values_;
   double reach_mm_;
   std::array<double, 2> spacing_mm_;
-  Frame frame_;
   std::vector<Structure> structures_;
 };
 
