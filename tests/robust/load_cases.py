@@ -1,18 +1,24 @@
 #!/usr/bin/env python3
-"""Load cases that nobody tuned, made from a seed, through osteo fem and CalculiX (ccx); besides, closed forms, and what must be refused.
+"""Load cases that nobody tuned, made from a seed, through osteo fem and CalculiX (ccx); besides, closed forms, and what
+must be refused.
 
 usage: load_cases.py OSTEO [--count 50] [--seed 1] [--first 0] [--table] [--forms all,short,none] [--mutate]
 
-Case i of a seed is always the same: a solid (brick, bent bar, tube, ball, L, notched plate) of 0.001 to 1000 mm and 1 kPa to 20 GPa, Poisson's ratio
-up to 0.499, meshed by a lattice or by a method of tetrahedralize, one or two materials, a kind of holding, a kind of load, a law that both programs
-have (linear, stvk: NLGEOM, neo_hooke_split: NEO HOOKE) and linear or quadratic elements. Problems are JSON, or an input file as other programs write
-them (labels with gaps, sets, pressures on faces, GRAV), which both programs read. Asked is that
- - the displacements of all nodes are those of CalculiX, to LIMITS of the largest; so is what holds the body, of the sum of what holds its nodes;
+Case i of a seed is always the same: a solid (brick, bent bar, tube, ball, L, notched plate) of 0.001 to 1000 mm and
+1 kPa to 20 GPa, Poisson's ratio up to 0.499, meshed by a lattice or by a method of tetrahedralize, one or two
+materials, a kind of holding, a kind of load, a law that both programs have (linear, stvk: NLGEOM, neo_hooke_split: NEO
+HOOKE) and linear or quadratic elements. Problems are JSON, or an input file as other programs write them (labels with
+gaps, sets, pressures on faces, GRAV), which both programs read. Asked is that
+ - the displacements of all nodes are those of CalculiX, to LIMITS of the largest; so is what holds the body, of the sum
+   of what holds its nodes;
  - fem reads what --inp-out wrote and finds the same, to 1e-7; of contact pairs it says that it does not read them;
- - contact against a plane, which CalculiX spreads over faces and fem over points, agrees to CONTACT_LIMITS, what it pushes with to PUSH_LIMIT;
+ - contact against a plane, which CalculiX spreads over faces and fem over points, agrees to CONTACT_LIMITS, what it
+   pushes with to PUSH_LIMIT;
  - closed forms are met and nonsense is refused, as load_case_forms.py lists.
-A load that a solution cannot be found for by either program is halved, at most five times; --table says how often. With --mutate CalculiX gets loads
-that are 1 % larger, and the run passes when each case is found to differ: that the comparison sees a hundredth.
+A load that a solution cannot be found for by either program is halved, at most five times; --table says how often. With
+--mutate CalculiX gets loads that are 1 % larger, and the run passes when each case is found to differ: that the
+comparison sees a hundredth. Exit code 0 when all is right, 1 when something is not, 77 (skipped) where no case was
+compared: without ccx closed forms are tried still, and 1 goes before 77.
 """
 
 import argparse, json, math, os, random, re, shutil, subprocess, sys, tempfile
@@ -30,8 +36,8 @@ REACTION_LIMIT = 1e-6
 LOOP_LIMIT = 1e-7
 KINDS = ("pressure", "moved", "gravity", "contact", "force", "traction", "volume", "slid", "mixed")
 MESHES = ("vtu", "deck", "grid-conforming", "inp", "deck", "grid", "tetgen", "cgal", "graded", "deck")
-# CalculiX stops at half a percent of the residual by itself; whatever is asked, it stops where forces are below 1e-8, and it takes
-# a D1 below 1e-10 for none. It gets each body as one of about SIZE_MM and 1 MPa.
+# CalculiX stops at half a percent of the residual by itself; whatever is asked, it stops where forces are below 1e-8,
+# and it takes a D1 below 1e-10 for none. It gets each body as one of about SIZE_MM and 1 MPa.
 SIZE_MM = 1000
 CONTROLS = "*CONTROLS, PARAMETERS=FIELD\n1e-6, 1e-6, , , 1e-6\n"
 
@@ -312,8 +318,8 @@ class Case:
             own = found.get(("displacements", "ALL"))
             labels = range(1, len(ours) + 1) if own else labels_as_read(text)
             apart = off(ours, [(own or found["displacements", "NALL"])[n] for n in labels])
-            # Beyond a bifurcation one large increment stays on the path that is unstable; fem, which had to shift its Hessian,
-            # goes on to where the energy is less.
+            # Beyond a bifurcation one large increment stays on the path that is unstable; fem, which had to shift its
+            # Hessian, goes on to where the energy is less.
             self.small_increments = increments != "1, 1"
             if apart < 0.01 or report["factorisations_shifted"] == 0:
                 return found, apart
@@ -430,7 +436,7 @@ class Case:
 
 
 def labels_as_read(text):
-    """Labels of an input file in the order of fem's nodes: corners as they stand, then middles as elements name them."""
+    """Labels in the order of fem's nodes: corners as they stand in the file, then middles as elements name them."""
     nodes, corners, middles = [], set(), {}
     for name, options, rows in cards(text):
         if name == "NODE":
@@ -537,7 +543,7 @@ def main():
     args = args.parse_args()
     osteo, bad, differences = os.path.abspath(args.osteo), [], {}
     if shutil.which("ccx") is None:
-        print("CalculiX (ccx) is not installed: agreement with it not tested")
+        print("CalculiX (ccx) is not installed: agreement with it not tested", file=sys.stderr)
         args.count = 0
     for number in range(args.first, args.first + args.count):
         case = Case(args.seed, number)
@@ -568,9 +574,11 @@ def main():
         differences.setdefault(key, []).append(apart)
         if args.table:
             shown = lambda v: "" if v is None else f"{v:.1e}"
+            body = f"{case.scale:.2g} mm, {case.young_kpa:.2g} kPa, nu {case.poisson:.3g}"
+            notes = "small increments" if case.small_increments else ""
             print(
-                f"| {case.name} | {case.scale:.2g} mm, {case.young_kpa:.2g} kPa, nu {case.poisson:.3g} | {nodes} | {shown(apart)} | "
-                f"{shown(reaction)} | {shown(loop)} | {case.halved or ''} | {'small increments' if case.small_increments else ''} |",
+                f"| {case.name} | {body} | {nodes} | {shown(apart)} | {shown(reaction)} | {shown(loop)} "
+                f"| {case.halved or ''} | {notes} |",
                 flush=True,
             )
     if args.table:
@@ -580,8 +588,14 @@ def main():
     if args.forms != "none":
         with tempfile.TemporaryDirectory() as work:
             bad += load_case_forms.check(Program(osteo, work), args.forms == "all", args.table, Refused)
-    print("\n".join(bad) or "all right", file=sys.stderr)
-    return 1 if bad else 0
+    if bad:
+        print("\n".join(bad), file=sys.stderr)
+        return 1
+    if not args.count:
+        print("no load case was compared" + ("" if args.forms == "none" else "; closed forms are met"), file=sys.stderr)
+        return 77
+    print("all right", file=sys.stderr)
+    return 0
 
 
 if __name__ == "__main__":

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
+#include <functional>
 #include <random>
 
 #include "block.h"
@@ -317,7 +319,11 @@ TEST(TissueProblem, StepsOfAnInpFileGoOn) {
         {{"*DLOAD\nE,GRAV,10,0,0,1\n", "*DLOAD\nE,GRAV,20,0,0,1\n", "*DLOAD\nE,GRAV,10,0,1,0\n"},
          {{0, 0, 1.857143e-3}, {0, 0, 3.714286e-3}, {0, 6.5e-3, 3.714286e-3}}},
         {{"*DLOAD\nE,GRAV,10,0,0,2\n"}, {{0, 0, 1.857143e-3}}},  // a direction, of any length
-        {{"*DLOAD\nE,GRAV,10,0,0,1\nE,GRAV,10,0,0,1\n"}, {{0, 0, 3.714286e-3}}},
+        {{"*DLOAD\nE,GRAV,10,0,0,1\nE,GRAV,10,0,0,1\n", "*DLOAD\nE,GRAV,10,0,0,1\n"},
+         {{0, 0, 3.714286e-3}, {0, 0, 1.857143e-3}}},
+        {{"*DLOAD\nE,GRAV,10,0,0,1\nE,GRAV,10,0,0,1\nE,GRAV,10,0,0,1\n", "*DLOAD\nE,GRAV,10,0,1,0\n",
+          "*DLOAD\nE,GRAV,10,0,0,1\n*DLOAD\nE,GRAV,10,0,0,1\n"},
+         {{0, 0, 5.571429e-3}, {0, 6.5e-3, 5.571429e-3}, {0, 6.5e-3, 3.714286e-3}}},
         {{"*BOUNDARY\n4,1,1,.01\n", "*BOUNDARY\n4,1,1,.02\n", "*BOUNDARY\n4,2,2,.02\n"},
          {{0.01, 0, 0}, {0.02, 0, 0}, {0.02, 0.02, 0}}}}) {
     std::string text = head;
@@ -328,13 +334,35 @@ TEST(TissueProblem, StepsOfAnInpFileGoOn) {
     for (std::size_t n = 0; n < p.loads.size(); ++n)
       EXPECT_LT(length(statics(body, p.loads[n]).points_mm[3] - body.rest()[3] - c.tip_mm[n]), 1e-6) << text << n;
   }
-  const auto rejected = [&](const std::string& steps) {
-    EXPECT_THROW(static_cast<void>(parse_tissue_problem(head + steps, mesh)), Error) << steps;
+  const auto lines = [](const std::string& text) { return std::count(text.begin(), text.end(), '\n'); };
+  // The error names the line, here counted from the end.
+  const auto rejected = [&](const std::string& steps, long from_end, const std::string& what) {
+    try {
+      static_cast<void>(parse_tissue_problem(head + steps, mesh));
+      ADD_FAILURE() << steps << " was read";
+    } catch (const Error& e) {
+      const std::string said = e.what(), line = "line " + std::to_string(lines(head + steps) + 1 - from_end) + ",";
+      EXPECT_NE(said.find(line), std::string::npos) << said;
+      EXPECT_NE(said.find(what), std::string::npos) << said;
+    }
   };
-  rejected("*STEP\n*END STEP\n*STEP, NLGEOM\n*END STEP\n");
-  rejected("*STEP\n*END STEP\n*STEP, PERTURBATION\n*END STEP\n");
-  rejected("*STEP\n*BOUNDARY, OP=NEW\n4, 1\n*END STEP\n");
-  rejected("*STEP\n*DLOAD\nE, GRAV, 10, 0, 0, 0\n*END STEP\n");
+  rejected("*STEP\n*END STEP\n*STEP, NLGEOM\n*END STEP\n", 2, "different laws");
+  // CalculiX solves the second step by the linear law: 1.56 mm after 1.11 mm.
+  rejected("*STEP, NLGEOM\n*CLOAD\n4, 1, .1\n*END STEP\n*STEP, NLGEOM=NO\n*END STEP\n", 2, "different laws");
+  rejected("*STEP\n*END STEP\n*STEP, PERTURBATION\n*END STEP\n", 2, "different laws");
+  rejected("*STEP\n*DLOAD\nE, GRAV, 10, 0, 0, 0\n*END STEP\n", 3, "no direction");
+  for (const std::string option : {"OP=NEW", "FIXED", "TYPE=VELOCITY", "AMPLITUDE=A", "USER"}) {
+    const std::string name = option.substr(0, option.find('='));
+    rejected("*STEP\n*BOUNDARY, " + option + "\n4, 1, 1, .1\n*END STEP\n", 3, name);
+    rejected("*BOUNDARY, " + option + "\n4, 1\n*STEP\n*END STEP\n", 4, name);
+  }
+  // What says nothing new is read: CalculiX keeps to NLGEOM where a later step does not name it.
+  for (const std::string steps :
+       {"*STEP, NLGEOM\n*END STEP\n*STEP\n*END STEP\n", "*STEP, NLGEOM\n*END STEP\n*STEP, NLGEOM=YES\n*END STEP\n",
+        "*STEP, NLGEOM\n*BOUNDARY, OP=MOD, TYPE=DISPLACEMENT\n4, 1, 1, .1\n*END STEP\n"})
+    EXPECT_EQ(parse_tissue_problem(head + steps, mesh).law, ElasticLaw::stvk) << steps;
+  EXPECT_EQ(parse_tissue_problem(head + "*STEP\n*END STEP\n*STEP, NLGEOM=NO\n*END STEP\n", mesh).law,
+            ElasticLaw::linear);
 }
 
 // Between two faces that are held, each by itself, the body is free: also the middle of an edge that goes from one to
@@ -379,6 +407,60 @@ TEST(TissueProblem, MiddlesBetweenHeldFacesAreFree) {
     const Statics s = statics(body, body.on_all_points(parse_tissue_problem(other, mesh).loads[0]));
     for (std::size_t q = 0; q < body.point_count(); ++q) EXPECT_LT(length(s.points_mm[q] - r.points_mm[q]), 1e-9);
   }
+}
+
+// C3D4 elements name no middles. Solved by quadratic ones, an edge through the body between two held faces has a free
+// middle; on a held face, and in a volume that is held, all of it is held.
+TEST(TissueProblem, MiddlesOfLinearElementsThroughTheBodyAreFree) {
+  const auto text_of = [](const TetMesh& mesh, const std::function<bool(Vec3)>& held) {
+    std::string t = "*NODE\n", holds = "*BOUNDARY\n";
+    for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) {
+      const Vec3 x = from_floats(mesh.points_mm[p]);
+      t += std::to_string(p + 1) + ", " + std::to_string(x.x) + ", " + std::to_string(x.y) + ", " +
+           std::to_string(x.z) + "\n";
+      if (held(x)) holds += std::to_string(p + 1) + ", 1, 3\n";
+    }
+    t += "*ELEMENT, TYPE=C3D4, ELSET=E\n";
+    for (std::size_t e = 0; e < mesh.tets.size(); ++e) {
+      t += std::to_string(e + 1);
+      for (const std::uint32_t p : mesh.tets[e]) t += ", " + std::to_string(p + 1);
+      t += "\n";
+    }
+    return t + "*MATERIAL, NAME=M\n*ELASTIC\n1, 0.3\n*SOLID SECTION, ELSET=E, MATERIAL=M\n" + holds +
+           "*STEP\n*STATIC\n*END STEP\n";
+  };
+  // The middles that are held.
+  const auto held_middles = [&](const TetMesh& mesh, const std::function<bool(Vec3)>& held) {
+    const TissueProblem p = parse_tissue_problem(text_of(mesh, held), mesh);
+    const FemBody body(points_of(mesh), tets_of(mesh), p.materials, ElasticLaw::linear, TetOrder::t10);
+    std::vector<Vec3> at;
+    for (const std::uint32_t q : body.on_all_points(p.loads[0]).fixed) {
+      if (q >= body.corner_count()) at.push_back(body.rest()[q]);
+    }
+    return at;
+  };
+  // One layer between two plates: only along the rim do edges of the surface join them.
+  const TetMesh layer = mesh_of(test::block(3, 3, 1, 10.0));
+  int between = 0, on_plates = 0, inside = 0;
+  for (const Vec3 x : held_middles(layer, [](Vec3) { return true; })) {
+    (x.z == 5 ? between : on_plates) += 1;
+    inside += x.z == 5 && x.x > 0 && x.x < 30 && x.y > 0 && x.y < 30 ? 1 : 0;
+  }
+  EXPECT_EQ(inside, 0);
+  EXPECT_GT(between, 0);
+  EXPECT_EQ(on_plates, 2 * (2 * 3 * 4 + 9));  // two plates of 3 x 3 squares: sides and a diagonal each
+  // The lower half of a block of 4 x 4 x 4 is held: so is each middle well inside of it, where an end is inside too.
+  const TetMesh block = mesh_of(test::block(4, 4, 4, 10.0));
+  const auto deep = [](const std::vector<Vec3>& middles) {
+    return std::count_if(middles.begin(), middles.end(),
+                         [](Vec3 x) { return x.x > 5 && x.x < 35 && x.y > 5 && x.y < 35 && x.z > 5 && x.z <= 20; });
+  };
+  const FemBody body(points_of(block), tets_of(block), std::vector<Material>{{1, 0.3}}, ElasticLaw::linear,
+                     TetOrder::t10);
+  const std::vector<Vec3> middles(body.rest().begin() + static_cast<std::ptrdiff_t>(body.corner_count()),
+                                  body.rest().end());
+  EXPECT_GT(deep(middles), 50);
+  EXPECT_EQ(deep(held_middles(block, [](Vec3 c) { return c.z < 25; })), deep(middles));
 }
 
 }  // namespace

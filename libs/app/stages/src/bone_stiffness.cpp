@@ -182,7 +182,7 @@ void warn_of_extrapolation(const BoneDensity& density, const BoneStiffness& bone
 StageInfo BoneStiffnessStage::info() {
   return {
       .name = "bone-stiffness",
-      .version = 1,
+      .version = 2,
       .synopsis = "bone as stiff as its CT says: a finite element problem with graded material",
       .description =
           "Each tetrahedron gets the mean, over its volume, of Young's modulus by the density of the CT's voxels. The "

@@ -258,7 +258,7 @@ std::vector<Data> calibrate_to_elements(const CalibrateParams& p, const TetMesh&
 StageInfo CalibrateStage::info() {
   return {
       .name = "calibrate",
-      .version = 2,
+      .version = 3,
       .synopsis = "constants of the fast tissue model, fitted to finite elements or to what was measured",
       .description =
           "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; "

@@ -102,7 +102,7 @@ void warn_of(const DampingFit& fit, const FitDampingParams& p, const Context& co
 StageInfo FitDampingStage::info() {
   return {
       .name = "fit-damping",
-      .version = 1,
+      .version = 2,
       .synopsis = "damping of the fast tissue model, from a motion that was measured",
       .description =
           "A body was plucked by the problem's load, let go, and its displacement measured over time (CSV: time_s; "

@@ -17,7 +17,7 @@ using namespace tissue;
 
 StageInfo FemStage::info() {
   return {.name = "fem",
-          .version = 3,
+          .version = 4,
           .synopsis = "how a soft body deforms under a load, by finite elements",
           .description =
               "Static equilibrium of tetrahedra under dead loads: Newton's method with exact Hessians and sparse "
@@ -101,7 +101,7 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
 StageInfo SimulateStage::info() {
   return {
       .name = "simulate",
-      .version = 3,
+      .version = 4,
       .synopsis = "a soft body in time, by the fast distance and volume model",
       .description =
           "Explicit steps with a limit that is certified, or implicit ones of any length for stiff bodies; lumped "

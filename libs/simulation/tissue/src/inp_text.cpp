@@ -228,7 +228,7 @@ std::string inp_text(const FemBody& body, const TissueLoad& load) {
       t += std::to_string(m.point + 1) + ", " + axis + ", " + axis + ", " + field(m.by_mm[a]) + "\n";
     }
   }
-  std::map<std::uint32_t, Vec3> forces;  // some points have several, which a later line would replace
+  std::map<std::uint32_t, Vec3> forces;  // a point may have several; here their sum, as the lines of a step add up
   for (const auto& [p, f] : load.forces_n) forces[p] += f;
   if (!forces.empty()) t += "*CLOAD\n";
   for (const auto& [p, f] : forces) {

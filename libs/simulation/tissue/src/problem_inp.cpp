@@ -1,9 +1,13 @@
 #include "problem_inp.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/io/inp_io.h"
@@ -53,19 +57,21 @@ class Reader {
       } else if (card.name == "SOLID SECTION") {
         sections_.push_back({option(card, "ELSET"), option(card, "MATERIAL"), &card});
       } else if (card.name == "BOUNDARY") {
-        if (in_step) {
-          if (card.options.contains("OP") && card.options.at("OP") != "MOD")
-            throw fail(card, "OP= is not read: what earlier steps hold stays held");
-          boundary_of_step(card);
-        } else {
-          boundary(card);
+        for (const auto& [name, value] : card.options) {
+          if (name == "OP" && value != "MOD") throw fail(card, "OP= is not read: what earlier cards hold stays held");
+          // DISPLACEMENT is what a card without TYPE= means.
+          if (name != "OP" && (name != "TYPE" || value != "DISPLACEMENT"))
+            throw fail(card, name + " is not read, and might change the answer");
         }
+        in_step ? boundary_of_step(card) : boundary(card);
       } else if (card.name == "STEP") {
-        const bool now = card.options.contains("NLGEOM") && card.options.at("NLGEOM") != "NO";
-        if (in_step && ((now && !large) || card.options.contains("PERTURBATION")))
+        // Without NLGEOM a step keeps to what the one before it had.
+        const auto nlgeom = card.options.find("NLGEOM");
+        const bool now = nlgeom != card.options.end() ? nlgeom->second != "NO" : large;
+        if (in_step && (now != large || card.options.contains("PERTURBATION")))
           throw fail(card, "steps of different laws are not read", "give each a file of its own");
         in_step = true;
-        large = large || now;
+        large = now;
         // A step goes on from the one before: what acted there still acts.
         steps_.push_back(steps_.empty() ? Step{} : steps_.back());
         now_ = {};
@@ -88,6 +94,7 @@ class Reader {
     hold();
     if (needs_loads && steps_.empty()) throw Error(ExitCode::usage, "the tissue problem, loads: there is no *STEP");
     materials();
+    if (!file_.quadratic) through_ = edges_through_body();
     const bool follows = large || problem_.law == ElasticLaw::neo_hooke_split;
     for (const Step& step : steps_) {
       if (!step.pulls.empty() && weight == Weight::apart)
@@ -241,9 +248,50 @@ class Reader {
       }
       if (own.axes != both) load.edges_held.push_back({ends, own.axes});
     }
+    for (const auto& edge : through_) {
+      if ((of_point[edge[0]].axes & of_point[edge[1]].axes) != 0) load.edges_held.push_back({edge, 0});
+    }
     // By place, not by how the map keeps them.
     std::sort(load.edges_held.begin(), load.edges_held.end(),
               [](const auto& x, const auto& y) { return x.edge < y.edge; });
+  }
+  // Linear elements name no middles, which --order t10 adds. An edge that goes through the body from surface to surface
+  // joins two faces that are held each by itself, and its middle is free. Where a corner inside the body is held, a
+  // volume is, and the middle with it.
+  [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> edges_through_body() const {
+    const auto& tets = file_.mesh.tets;
+    std::vector<std::array<std::uint32_t, 3>> faces;
+    std::vector<std::array<std::uint32_t, 2>> edges, on_surface, through;
+    const auto add_edges = [](const auto& corners, auto& to) {
+      for (std::size_t i = 0; i < corners.size(); ++i) {
+        for (std::size_t j = i + 1; j < corners.size(); ++j)
+          to.push_back({std::min(corners[i], corners[j]), std::max(corners[i], corners[j])});
+      }
+    };
+    for (const auto& t : tets) {
+      for (const auto& f : kTetFaces) {
+        faces.push_back({t[f[0]], t[f[1]], t[f[2]]});
+        std::sort(faces.back().begin(), faces.back().end());
+      }
+      add_edges(t, edges);
+    }
+    std::sort(faces.begin(), faces.end());
+    std::vector<bool> surface_point(file_.mesh.points_mm.size());
+    for (std::size_t i = 0; i < faces.size();) {
+      std::size_t next = i + 1;
+      while (next < faces.size() && faces[next] == faces[i]) ++next;
+      if (next == i + 1) {
+        for (const std::uint32_t p : faces[i]) surface_point[p] = true;
+        add_edges(faces[i], on_surface);
+      }
+      i = next;
+    }
+    std::sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    std::sort(on_surface.begin(), on_surface.end());
+    std::set_difference(edges.begin(), edges.end(), on_surface.begin(), on_surface.end(), std::back_inserter(through));
+    std::erase_if(through, [&](const auto& e) { return !surface_point[e[0]] || !surface_point[e[1]]; });
+    return through;
   }
   // What holds points in all steps.
   void hold() {
@@ -285,10 +333,11 @@ class Reader {
         if (!(length(along) > 0)) throw fail(card, "gravity has no direction");
         const Pull made{row[0], normalized(along), number_of(card, row[2]), &card};
         const auto before = step.pulls.end() - static_cast<std::ptrdiff_t>(now_.pulls);
-        const auto same = std::find_if(step.pulls.begin(), before, [&](const Pull& p) {
+        // An equal pull may stand there several times: all of them are replaced, as CalculiX does.
+        const auto kept = std::remove_if(step.pulls.begin(), before, [&](const Pull& p) {
           return p.set == made.set && length(p.along - made.along) < 1e-9;
         });
-        if (same != before) step.pulls.erase(same);
+        step.pulls.erase(kept, before);
         step.pulls.push_back(made);
         ++now_.pulls;
         continue;
@@ -385,6 +434,7 @@ class Reader {
   Named now_;
   std::map<long, std::uint8_t> held_;
   const InpCard* last_boundary_ = nullptr;
+  std::vector<std::array<std::uint32_t, 2>> through_;  // edges_through_body(), of linear elements
 };
 
 }  // namespace
