@@ -243,15 +243,11 @@ TEST(StructuresView, WhatRunsOutOfTheBoneFadesTowardsItsBorder) {
   for (std::size_t mm = 0; mm < out.size(); ++mm)
     std::printf("%zu mm from the middle: %.2f drawn, clear %.2f; of one that ends before %.2f\n", mm, out[mm],
                 clear[mm], whole[mm]);
-  EXPECT_EQ(out[0], 1);
-  EXPECT_EQ(out[1], 1);
-  for (std::size_t mm = 2; mm < 6; ++mm) {
-    EXPECT_LT(out[mm], out[mm - 1]) << mm;
-    EXPECT_LT(clear[mm], 0.6 * out[mm] + 0.01) << mm;
-  }
-  EXPECT_NEAR(out[4], 0.3, 0.15);
-  EXPECT_LT(out[5], 0.12);
-  EXPECT_NEAR(clear[0], 0.5, 0.05);
+  // A sixth of 12 mm.
+  for (std::size_t mm = 0; mm < 4; ++mm) EXPECT_EQ(out[mm], 1) << mm;
+  EXPECT_NEAR(out[4], 0.6, 0.15);
+  EXPECT_LT(out[5], 0.25);
+  for (std::size_t mm = 0; mm < 6; ++mm) EXPECT_NEAR(clear[mm], out[mm] / 2, 0.06) << mm;
   for (std::size_t mm = 0; mm < 4; ++mm) EXPECT_EQ(whole[mm], 1) << mm;
   for (std::size_t mm = 0; mm < 5; ++mm) {
     EXPECT_EQ(cropped[mm], 1) << mm;

@@ -20,7 +20,7 @@ TriangleSoup soup_from(const Data& data, double iso, const Context& context) {
 StageInfo CompareStage::info() {
   return {
       .name = "compare",
-      .version = 1,
+      .version = 2,
       .synopsis = "how far apart two surfaces, grids or tetrahedral meshes are",
       .description =
           "Distances from each surface to the other: mean, RMS and 95th percentile over area, and the maximum "

@@ -16,7 +16,7 @@ Vec3 vec(const std::array<float, 3>& p) {
 
 StageInfo EmbedSurfaceStage::info() {
   return {.name = "embed-surface",
-          .version = 1,
+          .version = 2,
           .synopsis = "a surface that follows a tetrahedral mesh when it deforms",
           .description =
               "Binds the surface to the mesh at rest and moves it with the deformed mesh, which must have the same "

@@ -176,7 +176,7 @@ std::string_view copyleft_parts() {
 
 StageInfo MeshInfoStage::info() {
   return {.name = "mesh-info",
-          .version = 1,
+          .version = 2,
           .synopsis = "what a surface is like: closedness, bodies, holes, bad triangles",
           .description =
               "Counts what can be wrong with a surface and what it measures. Takes any file that can be read, however "

@@ -4,7 +4,7 @@ namespace osteo::inline app {
 
 StageInfo SnapshotStage::info() {
   return {.name = "snapshot",
-          .version = 2,
+          .version = 3,
           .synopsis = "a picture (PNG) of a CT, mask, grid, surface or tetrahedra",
           .description =
               "Three cuts through the middle (axial seen from the feet: the patient's left is on the right) and a lit "
