@@ -172,8 +172,10 @@ TEST(LiveLog, WhoWasFarBehindCatchesUp) {
   };
   for (int t = 0; t < 40'000; ++t) step(t % 3 == 0 ? 1 : 0);
   ASSERT_LT(taken + 20'000, link.ticks) << "it is not far behind";
-  for (int t = 0; t < 20'000 && taken < link.ticks; ++t) step(5);
-  EXPECT_EQ(link.guest.next_tick() + 30 > link.ticks, true) << link.guest.next_tick() << " of " << link.ticks;
+  for (int t = 0; t < 20'000 && taken + 50 < link.ticks; ++t) step(5);
+  std::printf("26,000 ticks behind, it had all after %d ms\n", static_cast<int>(link.ticks) - 40'000);
+  EXPECT_GT(link.guest.next_tick() + 50, link.ticks);
+  EXPECT_LT(link.ticks, 55'000U) << "faster than time goes";
 }
 
 // More at once than a packet holds: ticks go on, with the first of it.

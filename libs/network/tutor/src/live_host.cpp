@@ -282,7 +282,12 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
       p.blob_sent = static_cast<std::uint32_t>(at);
       continue;
     }
-    if (overdue(p, patience_us, now_us)) static_cast<void>(send_log(log_from(p.next_tick)));
+    if (overdue(p, patience_us, now_us)) {
+      // One that was far behind has let go of all that came meanwhile.
+      p.burst = p.next_tick == p.resent_to ? std::min(2 * p.burst, kPacketsAPoll) : 1;
+      p.resent_to = p.next_tick;
+      for (int n = 0; n < p.burst && p.resent_to < p.sent_to; ++n) p.resent_to = send_log(log_from(p.resent_to));
+    }
     p.sent_to = std::max(p.sent_to, p.next_tick);
     int sent = 0;
     while (p.sent_to + LogPacket::kMaxTicks < ticks && p.sent_to < p.next_tick + kWindowTicks && sent < kPacketsAPoll) {

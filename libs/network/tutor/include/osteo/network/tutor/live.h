@@ -192,6 +192,8 @@ class LiveHost final : public Reader, private PairingSeats {
       std::uint64_t end = 0;
       std::int64_t at_us = 0;
     };
+    std::uint64_t resent_to = 0;                  // what was sent again last ends there
+    int burst = 1;                                // packets at once, while what follows is missing too
     std::map<std::uint64_t, Sent> on_way;         // packets of ticks by their first, that may still come or be lost
     std::uint32_t blob_bytes = 0, blob_sent = 0;  // of the settings: it has, are on their way
     std::int64_t blob_moved_us = 0;
