@@ -289,6 +289,7 @@ bool stays(const PlannedFragment& f) {
 Outcome measure_outcome(const SurgicalPlan& plan, const std::vector<std::pair<std::string, TriangleSoup>>& bones,
                         const Image& postop, const OutcomeParams& params, const Context& context) {
   for (const auto& [name, bone] : bones) planning::require_size_mm(bounds_of(bone), name, planning::kShortestBoneMm);
+  outcome::require_plates(plan);
   const Frame& f = postop.frame;
   planning::require_size_mm({{}, {f.dims[0] * f.spacing_mm.x, f.dims[1] * f.spacing_mm.y, f.dims[2] * f.spacing_mm.z}},
                             "CT after surgery", planning::kShortestBoneMm);

@@ -124,6 +124,10 @@ class Finder {
       why = "the CT's voxels are too large for a hole of this diameter";
       return std::nullopt;
     }
+    if (!w.screw->empty && clip_ <= metal_) {
+      why = "the CT's values are cut off below those of metal";
+      return std::nullopt;
+    }
     if (!w.screw->empty && nearest_metal(w) > kNearMetalMm) {
       why = "there is no metal near the planned place";
       there = false;
@@ -499,9 +503,14 @@ void compare(ScrewOutcome& out, const Wanted& w, const RodFit& rod, const Fit& f
                               params.max_unsure_mm);
   const auto fill = [&](std::array<Interval95, 3>& to, Vec3 off, const Three& covariance, bool across) {
     bool sure = true;
+    // Across the screw, and what is left of the way along which nothing is known: at right angles, so that the order in
+    // which both are taken off makes no difference.
+    Vec3 unknown = out.slides_along;
+    if (across) unknown -= wanted * dot(unknown, wanted);
+    unknown = length(unknown) > 1e-6 ? normalized(unknown) : Vec3{};
     const auto left = [&](Vec3 v) {
       if (across) v -= wanted * dot(v, wanted);
-      return v - out.slides_along * dot(v, out.slides_along);
+      return v - unknown * dot(v, unknown);
     };
     off = left(off);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -533,7 +542,7 @@ void compare(ScrewOutcome& out, const Wanted& w, const RodFit& rod, const Fit& f
   }
   out.angle_deg = portable::atan2(portable::hypot(tangent[0], tangent[1]), 1) / kDeg;
   if (!out.known || !out.direction_known || !out.tip_known) out.why = "the interval is wider than what is accepted";
-  if (s.empty && out.known && out.direction_known && !out.tip_known) out.why = "the CT shows no bottom of the hole";
+  if (s.empty && out.known && out.direction_known && !rod.end_seen) out.why = "the CT shows no bottom of the hole";
 }
 
 }  // namespace
@@ -592,14 +601,20 @@ void find_screws(Outcome& out, const SurgicalPlan& plan, const std::vector<std::
                       ? std::nullopt
                       : finder.find(wanted[b], taken, wanted[a].radius, out.screws[b].why, out.screws[b].found);
         again = true;
-        if (rods[b] && std::any_of(taken.begin(), taken.end(), [&](const Rod& t) {
+        const bool same =
+            rods[b] && std::any_of(taken.begin(), taken.end(), [&](const Rod& t) {
               const Vec3 p = t.local(rods[b]->rod.world({0, 0, rods[b]->middle}));
-              return portable::hypot(p.x, p.y) < kSameRod * 2 * wanted[b].radius;
-            }))
-          rods[b].reset();
+              return portable::hypot(p.x, p.y) < kSameRod * 2 * wanted[b].radius && p.z > -1 && p.z < t.tip + 1;
+            });
+        if (same) rods[b].reset();
         if (rods[b]) continue;
-        out.screws[b].found = false;
-        out.screws[b].why = "what is near the planned place is that of '" + plan.screws[a].name + "'";
+        if (plan.screws[b].empty) {  // it was not looked for again
+          out.screws[b].found = true;
+          out.screws[b].why = "one lies where two are planned; which of them it is cannot be known";
+        } else if (same || !out.screws[b].found) {
+          out.screws[b].found = false;
+          out.screws[b].why = "what is near the planned place is that of '" + plan.screws[a].name + "'";
+        }
         if (farther - nearer >= kUndecidedMm) continue;
         for (const std::size_t n : {a, b}) {
           rods[n].reset();

@@ -58,6 +58,8 @@ void deviation(FragmentOutcome& out, const PlannedFragment& planned, const Fit& 
 void find_screws(Outcome& out, const SurgicalPlan& plan, const std::vector<std::optional<Fit>>& fits,
                  const planning::EdgeReader& ct, const Image& postop, const OutcomeParams& params,
                  const Context& context);
+/// Error(usage): a plate's surface is empty, open or of another unit than mm.
+void require_plates(const SurgicalPlan& plan);
 void find_plates(Outcome& out, const SurgicalPlan& plan, const std::vector<std::optional<Fit>>& fits,
                  const std::vector<std::vector<SurfacePlace>>& places, const planning::EdgeReader& ct,
                  const Image& postop, const OutcomeParams& params, const Context& context);

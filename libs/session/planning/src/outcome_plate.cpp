@@ -14,6 +14,7 @@
 #include "osteo/core/base/portable_math.h"
 #include "osteo/geometry/distance/distance_map.h"
 #include "outcome_parts.h"
+#include "section.h"
 
 namespace osteo::inline session::outcome {
 namespace plates {
@@ -340,6 +341,19 @@ class Finder {
 }  // namespace
 }  // namespace plates
 
+void require_plates(const SurgicalPlan& plan) {
+  constexpr double kShortestPlateMm = 8;
+  for (const PlannedPlate& plate : plan.plates) {
+    require_sound(plate.surface);
+    if (plate.surface.triangles.empty())
+      throw Error(ExitCode::usage, "the surface of '" + plate.name + "' is empty", "give the plate's own surface");
+    if (!is_closed(plate.surface))
+      throw Error(ExitCode::usage, "the surface of '" + plate.name + "' is not closed",
+                  "'osteo mesh-repair' closes surfaces");
+    planning::require_size_mm(bounds_of(plate.surface), plate.name, kShortestPlateMm);
+  }
+}
+
 void find_plates(Outcome& out, const SurgicalPlan& plan, const std::vector<std::optional<Fit>>& fits,
                  const std::vector<std::vector<SurfacePlace>>& places, const planning::EdgeReader& ct,
                  const Image& postop, const OutcomeParams& params, const Context& context) {
@@ -349,10 +363,6 @@ void find_plates(Outcome& out, const SurgicalPlan& plan, const std::vector<std::
   std::size_t reference = 0;
   while (!out.fragments[reference].reference) ++reference;
   for (const PlannedPlate& plate : plan.plates) {
-    require_sound(plate.surface);
-    if (!is_closed(plate.surface))
-      throw Error(ExitCode::usage, "the surface of '" + plate.name + "' is not closed",
-                  "'osteo mesh-repair' closes surfaces");
     std::string why;
     const Fit& base = *fits[reference];
     const auto fit = finder.find(plate, base.pose, blur_of(base), why);
