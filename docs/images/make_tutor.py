@@ -134,5 +134,9 @@ if "console" in wanted:
         ],
         check=True,
     )
-    keep(pathlib.Path(folder, "pictures/console-silence-1100.png"), "nerve-console.png")
-    keep(pathlib.Path(folder, "pictures/console-stimulator.png"), "nerve-stimulator.png")
+    # The driver's pictures are of the whole screen, which is black beside the window.
+    for name, kept in (("console-silence-1100", "nerve-console"), ("console-stimulator", "nerve-stimulator")):
+        path = pathlib.Path(folder, f"pictures/{name}.png")
+        screen = Image.open(path).convert("RGB")
+        screen.crop((0, 0, 1100, 640)).save(path)
+        keep(path, f"{kept}.png")
