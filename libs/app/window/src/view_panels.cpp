@@ -481,8 +481,9 @@ bool draw_next_step(const ScreenBox& view, float free_width, const ScreenBox& ca
       filled(tr("{n} of {all}"), {{"n", std::to_string(number)}, {"all", std::to_string(possible)}});
   // How far one is goes before the name does.
   const float name_wide = bold_font()->CalcTextSizeA(kLineEm * em(), FLT_MAX, 0, name.c_str()).x;
-  const bool counted = name_wide <= wide - 80 * u - ImGui::CalcTextSize(count.c_str()).x;
-  const float count_wide = counted ? ImGui::CalcTextSize(count.c_str()).x : 0;
+  float count_wide = ImGui::CalcTextSize(count.c_str()).x;
+  const bool counted = name_wide <= wide - 80 * u - count_wide;
+  if (!counted) count_wide = 0;
   const float title_y = box.y + (folded ? 10 : 12) * u;
   ImGui::SetCursorScreenPos({box.x, box.y});
   if (low && ImGui::InvisibleButton("unfold", {wide - 48 * u, kTile * u})) unfolded = !unfolded;

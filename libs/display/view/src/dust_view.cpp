@@ -100,10 +100,10 @@ struct DustView::Impl {
     dust.visit([&](Vec3 p, double full) {
       if (full < 0.02) return;
       const Vec3 x = frame.index_from_world(p);
-      Chance chance(std::lround(x.x), std::lround(x.y), std::lround(x.z));
-      if (kept < 1 && chance.next() > kept) return;
       const Ijk cell{static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)),
                      static_cast<int>(std::lround(x.z))};
+      Chance chance(cell.i, cell.j, cell.k);
+      if (kept < 1 && chance.next() > kept) return;
       if (!is_drawn(dust, cell, cell_mm)) return;
       const int count = std::clamp(static_cast<int>(full * each + static_cast<double>(chance.next())), 1, each);
       const auto mean =

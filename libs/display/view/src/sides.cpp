@@ -27,15 +27,6 @@ namespace osteo::inline display {
 
 namespace {
 
-double area_mm2_of(const TriMesh& mesh) {
-  double twice = 0;
-  for (const auto& t : mesh.triangles) {
-    const Vec3 a = from_floats(mesh.points_mm[t[0]]);
-    twice += length(cross(from_floats(mesh.points_mm[t[1]]) - a, from_floats(mesh.points_mm[t[2]]) - a));
-  }
-  return twice / 2;
-}
-
 // Of the triangles around, where the mesh has none: they tell the sides of a thin wall apart.
 std::vector<std::array<float, 3>> normals_of(const TriMesh& mesh) {
   if (mesh.normals.size() == mesh.points_mm.size()) return mesh.normals;
@@ -88,8 +79,8 @@ PictureMesh mesh_for_pictures(const TriMesh& mesh) {
   // Of cubes as large as a smooth surface needs for so many triangles: about four for each of a cube's faces.
   const std::vector<std::array<float, 3>> normals = normals_of(mesh);
   std::size_t count = 0;
-  const std::vector<std::uint32_t> cell = cells_of(
-      mesh, normals, std::max(1e-6, std::sqrt(4 * area_mm2_of(mesh) / static_cast<double>(kTriangles))), count);
+  const std::vector<std::uint32_t> cell =
+      cells_of(mesh, normals, std::max(1e-6, std::sqrt(4 * area_mm2(mesh) / static_cast<double>(kTriangles))), count);
   // Of each its point that is nearest to the middle of all.
   std::vector<Vec3> middle(count);
   std::vector<double> members(count);

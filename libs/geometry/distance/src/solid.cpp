@@ -94,11 +94,15 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
   }
   std::sort(edges.begin(), edges.end(),
             [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b, x.layer) < std::tie(y.a, y.b, y.layer); });
+  std::vector<bool> at_border(layers.size());  // of their patch
   for (std::size_t i = 0, j = 0; i < edges.size(); i = j) {
     for (j = i + 1; j < edges.size() && edges[j].a == edges[i].a && edges[j].b == edges[i].b;) ++j;
     if (j - i == 2 && edges[i].forward != edges[i + 1].forward &&
-        layers[edges[i].layer].net == layers[edges[i + 1].layer].net)
+        layers[edges[i].layer].net == layers[edges[i + 1].layer].net) {
       join_sets(parent, edges[i].layer, edges[i + 1].layer);
+    } else {
+      for (std::size_t e = i; e < j; ++e) at_border[edges[e].layer] = true;
+    }
   }
   struct Patch {
     std::vector<std::uint32_t> layers;
@@ -113,6 +117,7 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
         length(cross(corner(layers[s], 1) - corner(layers[s], 0), corner(layers[s], 2) - corner(layers[s], 0)));
     Patch& patch = patches[root_of(parent, s)];
     patch.layers.push_back(s);
+    patch.closed = patch.closed && !at_border[s];
     if (area > patch.most) patch.largest = s, patch.most = area;
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -120,12 +125,6 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
         patch.hi[axis] = std::max(patch.hi[axis], corner(layers[s], i)[axis]);
       }
     }
-  }
-  for (std::size_t i = 0, j = 0; i < edges.size(); i = j) {
-    for (j = i + 1; j < edges.size() && edges[j].a == edges[i].a && edges[j].b == edges[i].b;) ++j;
-    const bool joined = j - i == 2 && edges[i].forward != edges[i + 1].forward &&
-                        layers[edges[i].layer].net == layers[edges[i + 1].layer].net;
-    for (std::size_t e = i; !joined && e < j; ++e) patches.at(root_of(parent, edges[e].layer)).closed = false;
   }
   enum class Verdict : std::uint8_t { drop, keep, turn };
   std::map<std::uint32_t, Verdict> of_patch;

@@ -39,6 +39,7 @@ constexpr double kModelMm = 0.02, kModelEndMm = 0.03, kModelDeg = 0.19, kHoleMod
 // A hole that ends in marrow or goes through shows no bottom; what there was taken for one was up to 1.6 mm off.
 constexpr double kBottomHu = 400, kBottomDoubt = 2;
 constexpr int kRounds = 25, kCoarseRounds = 3, kRing = 8;
+constexpr const char* kOneForTwo = "one lies where two are planned; which of them it is cannot be known";
 const double kInf = std::numeric_limits<double>::infinity();
 
 // What blur leaves of a long cylinder, over the distance from its axis.
@@ -610,7 +611,7 @@ void find_screws(Outcome& out, const SurgicalPlan& plan, const std::vector<std::
         if (rods[b]) continue;
         if (plan.screws[b].empty) {  // it was not looked for again
           out.screws[b].found = true;
-          out.screws[b].why = "one lies where two are planned; which of them it is cannot be known";
+          out.screws[b].why = kOneForTwo;
         } else if (same || !out.screws[b].found) {
           out.screws[b].found = false;
           out.screws[b].why = "what is near the planned place is that of '" + plan.screws[a].name + "'";
@@ -619,7 +620,7 @@ void find_screws(Outcome& out, const SurgicalPlan& plan, const std::vector<std::
         for (const std::size_t n : {a, b}) {
           rods[n].reset();
           out.screws[n].found = true;
-          out.screws[n].why = "one lies where two are planned; which of them it is cannot be known";
+          out.screws[n].why = kOneForTwo;
         }
       }
     }
