@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
 # One suite of a GoogleTest program, without what OSTEO_TESTS_LEFT_OUT names (its patterns, by colons). 77 (skipped) where no test of it ran.
 # usage: run_suite.sh PROGRAM SUITE
-source "$(dirname "$(readlink -f "$0")")/in_time.sh"
 export LANGUAGE=en  # what is compared is English, wherever it runs
 said=$(mktemp)
 trap 'rm -f "$said"' EXIT

@@ -9,7 +9,7 @@ set(tests "")
 file(STRINGS ${CMAKE_CURRENT_LIST_DIR}/long.txt long REGEX "^[^#]")
 foreach(suite ${suites})
   string(REGEX REPLACE "[. \n]" "" suite "${suite}")
-  string(APPEND tests "add_test([[${LIBRARY}.${suite}]] [[${CMAKE_CURRENT_LIST_DIR}/run_suite.sh]] [[${PROGRAM}]] [[${suite}]])\n"
+  string(APPEND tests "add_test([[${LIBRARY}.${suite}]] [[${CMAKE_CURRENT_LIST_DIR}/in_time.sh]] 0 [[${CMAKE_CURRENT_LIST_DIR}/run_suite.sh]] [[${PROGRAM}]] [[${suite}]])\n"
     "set_tests_properties([[${LIBRARY}.${suite}]] PROPERTIES LABELS unit TIMEOUT ${SECONDS} SKIP_RETURN_CODE 77)\n")
   # A cost below 0 comes behind all others, the one nearest to 0 first.
   foreach(row ${long})

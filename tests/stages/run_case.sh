@@ -9,7 +9,6 @@
 #   nobody command...              as a user without rights; exits the case with 77 (skipped) where that cannot be tried
 #   hears_interrupt PID            the process has its handler for SIGINT (bit 2 of the signals that it catches)
 set -euo pipefail
-source "$(dirname "$(readlink -f "$0")")/../in_time.sh"
 export LANGUAGE=en  # what is compared is English, wherever it runs
 file=$1 name=$2 bin=$3 fixtures=$4 source=$5
 PATH=$bin:$PATH
