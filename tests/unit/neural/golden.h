@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "folders.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/io/volume_io.h"
 #include "osteo/imaging/neural/detail/half.h"
@@ -14,7 +15,7 @@
 namespace osteo {
 
 inline fs::path golden(const std::string& name) {
-  return fs::path(OSTEO_SOURCE) / "testdata/neural" / name;
+  return source_folder() / "testdata/neural" / name;
 }
 
 struct Agreement {
