@@ -203,9 +203,10 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
     const Vec3 place = fit.pose(sheet.world(p));
     if (ct.metal_mm(place) < kMetalMm) continue;
     const auto edge = ct.along(place, fit.pose.rotation * e, kFaceReachMm);
-    if (edge && edge->drop_hu > kFaceDropShare * fit.drop && edge->rise_hu < kRiseShare * edge->drop_hu &&
-        edge->beyond_hu < fit.beyond + kBrighterHu)
-      seen.push_back({p, edge->at_mm - edge->pulled * fit.blur - fit.offset});
+    if (!edge || edge->drop_hu < kFaceDropShare * fit.drop || edge->rise_hu > kRiseShare * edge->drop_hu ||
+        edge->beyond_hu > fit.beyond + kBrighterHu)
+      continue;
+    seen.push_back({p, edge->at_mm - edge->pulled * fit.blur - fit.offset});
   }
   out.seen = places.empty() ? 0 : static_cast<double>(seen.size()) / static_cast<double>(places.size());
   if (places.size() < 30 || out.seen < kMinFaceSeen) {
@@ -271,18 +272,6 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
   return out;
 }
 
-const TriangleSoup& bone_called(const std::vector<std::pair<std::string, TriangleSoup>>& bones,
-                                const std::string& name) {
-  for (const auto& [called, bone] : bones)
-    if (called == name) return bone;
-  throw Error(ExitCode::usage, "the plan has fragments of the '" + name + "', whose surface is not given",
-              "give the surface of each bone that the plan cuts");
-}
-
-bool stays(const PlannedFragment& f) {
-  return f.planned_from_ct.rotation == Mat3{} && f.planned_from_ct.shift_mm == Vec3{};
-}
-
 }  // namespace
 }  // namespace outcome
 
@@ -346,11 +335,8 @@ Outcome measure_outcome(const SurgicalPlan& plan, const std::vector<std::pair<st
     o.edge_mm = fits[n]->rms;
     o.found = fits[n]->found;
     o.postop_from_ct = fits[n]->pose;
-    o.known = true;
     if (!o.reference) outcome::deviation(o, f, *fits[n], *fits[reference], params);
-    for (std::size_t k = 0; k < 3; ++k)
-      o.known = o.known && o.shift_mm[k].half <= params.max_unsure_mm && o.turn_deg[k].half <= params.max_unsure_deg;
-    if (!o.known) o.why = "the interval is wider than what is accepted";
+    outcome::judge(o, params);
     for (const CutPlane* p : planes[n]) {
       out.cuts.push_back(outcome::cut_of(*p, f.name, outcome::bone_called(bones, f.bone), *fits[n], ct, params));
       CutOutcome& c = out.cuts.back();
@@ -358,6 +344,7 @@ Outcome measure_outcome(const SurgicalPlan& plan, const std::vector<std::pair<st
         c.why = "the fragment's surface does not show where along itself it lies, so not where it was cut";
     }
   }
+  outcome::find_contours(out, plan, bones, fits, places, reference, params, context);
   outcome::find_screws(out, plan, fits, ct, postop, params, context);
   outcome::find_plates(out, plan, fits, places, ct, postop, params, context);
   return out;
