@@ -409,6 +409,63 @@ TEST(OutcomeMetal, AScrewThatNobodyPlannedIsTold) {
   EXPECT_EQ(o.screws[1].finding, "");
 }
 
+// An oblique screw in a segment that slides along itself: of what is left of its place, across both, intervals hold.
+TEST(OutcomeMetal, ObliqueScrewsInAShaftAreHeldAcrossIt) {
+  // 60 mm of the fibula beside the jaw, the screw near one end: edges within 8 mm of metal are left out.
+  const Vec3 axis{0, 0, 1}, middle{92, 0, -775}, out{0, 1, 0};
+  SurgicalPlan plan;
+  plan.planes = {world().advanced.planes[0],
+                 {"low", "fibula", middle - axis * 30.0, -axis, 1, true},
+                 {"high", "fibula", middle + axis * 30.0, axis, 1, true}};
+  RigidTransform beside;
+  beside.shift_mm = world().phantom.a_mm + outwards() * 30.0 - middle;
+  plan.fragments = {world().advanced.fragments[0], {"shaft", "fibula", {"low", "high"}, beside}};
+  PlannedScrew s;
+  s.name = "oblique";
+  s.fragment = "shaft";
+  s.entry_mm = middle + axis * 14.0 + out * 12;
+  while (world().donor.at(s.entry_mm) > 0) s.entry_mm -= out * 0.05;
+  s.tip_mm = s.entry_mm - normalized(out - axis * 0.8) * 9.0;
+  plan.screws = {s};
+  Errors errors;
+  int sliding = 0;
+  for (std::uint64_t seed = 31; seed <= 33; ++seed) {
+    Done d;
+    d.plan = plan;
+    d.truth = surgery(world(), d.plan, 0.7, 2, seed);
+    statistics::Random random(seed);
+    const Vec3 w = normalized(s.tip_mm - s.entry_mm), x = any_perpendicular(w), y = cross(w, x);
+    const RigidTransform off = motion(s.entry_mm, x * uniform(random, -0.6, 0.6) + y * uniform(random, -0.6, 0.6),
+                                      x * uniform(random, -4, 4) + y * uniform(random, -4, 4));
+    const TrueRod rod{off(s.entry_mm), off(s.tip_mm), s.diameter_mm, 1.5};
+    const RigidTransform to = d.truth.fragments[1].postop_from_ct;
+    TrueRod there = rod;
+    there.entry = to(rod.entry);
+    there.tip = to(rod.tip);
+    const Outcome o = measured(d.plan, ct_of(d, {solid_of(there)}, {}, seed));
+    ASSERT_EQ(o.screws.size(), 1U);
+    const ScrewOutcome& m = o.screws[0];
+    ASSERT_TRUE(m.known) << m.why;
+    if (m.slides_along == Vec3{}) continue;
+    ++sliding;
+    // Of the entry what is neither along the planned screw nor along the shaft: one direction.
+    const Vec3 known = normalized(cross(w, m.slides_along)), e = normalized(rod.tip - rod.entry);
+    const Vec3 truth = rod.entry + e * (dot(s.entry_mm - rod.entry, w) / dot(e, w)) - s.entry_mm;
+    Vec3 value;
+    for (std::size_t k = 0; k < 3; ++k) value[k] = m.entry_mm[k].value;
+    EXPECT_NEAR(length(value - known * dot(value, known)), 0, 1e-6) << "nothing is said of what is not known";
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(m.entry_mm[k].value, known[k] * dot(truth, known), 0.3);
+      if (m.entry_mm[k].half > 1e-6) errors.ask(0, m.entry_mm[k], known[k] * dot(truth, known));
+      // The half-widths are those of one number, as its direction has them.
+      EXPECT_NEAR(m.entry_mm[k].half * std::abs(known[0]), m.entry_mm[0].half * std::abs(known[k]), 1e-6);
+    }
+  }
+  EXPECT_EQ(sliding, 3);
+  EXPECT_GT(errors.over_half(0), 0.03);
+  EXPECT_LT(errors.over_half(0), 1);
+}
+
 // As the benchmark of outcomes: OSTEO_OUTCOME_SEEDS=601-640 test_planning --gtest_filter=OutcomeMetal.Benchmark
 TEST(OutcomeMetal, Benchmark) {
   const char* seeds = std::getenv("OSTEO_OUTCOME_SEEDS");

@@ -1,8 +1,9 @@
 // What came of a plan, from the file that 'osteo outcome' wrote into the case.
-#include <array>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
-#include "osteo/core/base/files.h"
 #include "osteo/core/base/translate.h"
 #include "texts.h"
 
