@@ -266,6 +266,21 @@ with Screen("1024x700") as screen:
     s = w.until("at the place", lambda t: t["cross_mm"] != before)
     classes, at = nrrd("netcase/uncertainty.seg.nrrd")
     assert at(s["cross_mm"]) == 4 and set(classes) == {0, 4}, (s["cross_mm"], set(classes))
+    # The network again, on the open scan: one step, taken back by one undo; another folder is rejected by its name.
+    names = [e["name"] for e in s["structures"]]
+    x, y, width, height = s["find_button"]
+    assert width > 50, s
+    press = lambda: w.x("mousemove", round(x + width / 2), round(y + height / 2), "click", 1)
+    press()
+    s = w.until("structures found", lambda t: t["steps"] == 1 and not t["busy"])
+    assert s["undo"] == "structures by network" and s["unsaved"], s
+    assert sorted(e["name"] for e in s["structures"]) == sorted(names) and s["places"], s
+    w.x("mousemove", *w.place(0, 0.5, 0.5))
+    w.key("ctrl+z", "taken back", lambda t: t["steps"] == 0 and t["can_redo"])
+    shutil.move("network", "elsewhere")
+    press()
+    w.until("no network", lambda t: "holds no trained network" in t["message"] and not t["busy"])
+    shutil.move("elsewhere", "network")
     w.x("key", "q")
     w.end()
 

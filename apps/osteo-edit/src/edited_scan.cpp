@@ -120,7 +120,9 @@ EditedScan open_edited_scan(const fs::path& folder, const std::string& scan, con
   if (!recipe->structures_hash.empty()) {
     StructuresParams names;
     fs::path file;
-    if (const auto path = recall_file(recipe->structures_hash); path && !is_network_folder(*path)) {
+    const auto path = recall_file(recipe->structures_hash);
+    if (path && is_network_folder(*path)) result.network = *path;
+    if (path && result.network.empty()) {
       file = *path;
       if (const auto it = recipe->settings.find("names"); it != recipe->settings.end()) names = {it->second, true};
     } else {

@@ -16,6 +16,7 @@ struct EditedScan {
   Labels mask;
   std::optional<Labels> structures;
   std::optional<Labels> uncertainty;  ///< of their boundaries, where a network found them that knows it
+  std::filesystem::path network;      ///< that found the structures, where it is known here; empty: none
   std::optional<EditRecipe> edits;
   std::filesystem::path scan;  ///< where it was found
 };

@@ -93,14 +93,33 @@ class Saver {
 };
 
 // Where a network could not say where a boundary lies, the largest first.
-std::vector<EditPlace> uncertain_in(const EditedScan& scan) {
+std::vector<EditPlace> uncertain_in(const Labels& structures, const Labels& uncertainty) {
   std::vector<EditPlace> places;
-  if (!scan.uncertainty) return places;
-  for (const UncertainPlace& p : uncertain_places(*scan.structures, *scan.uncertainty, 12)) {
-    for (const Structure& s : scan.structures->structures)
+  for (const UncertainPlace& p : uncertain_places(structures, uncertainty, 12)) {
+    for (const Structure& s : structures.structures)
       if (s.value == p.structure) places.push_back({p.at_mm, p.structure, s.name, p.voxels});
   }
   return places;
+}
+
+// As 'osteo segment-network' has it.
+EditFound found_by(const Image& ct, const std::string& network, const Context& context) {
+  if (!is_network_folder(network))
+    throw Error(ExitCode::no_input, "'" + network + "' holds no trained network",
+                "give a folder with plans.json and dataset.json, or with network.json");
+  const std::unique_ptr<Stage> stage = osteo_stages().make("segment-network");
+  const std::vector<Data> inputs{ct, Source{network}};
+  const std::vector<Data> out = stage->run(inputs, context);
+  EditFound found;
+  found.structures = std::get<Labels>(out[0]);
+  if (const auto* const uncertainty = std::get_if<Labels>(&out[1]))
+    found.places = uncertain_in(found.structures, *uncertainty);
+  for (const auto& [key, value] : context.take_report()) {
+    const auto* const text = std::get_if<std::string>(&value);
+    if (text == nullptr || (key != "disagreement" && key != "not_to_be_trusted")) continue;
+    found.note += (found.note.empty() ? "" : "; ") + *text;
+  }
+  return found;
 }
 
 struct EditWindowCommand {
@@ -120,7 +139,9 @@ struct EditWindowCommand {
     EditDocument document(scan->ct, scan->mask, scan->structures ? &*scan->structures : nullptr);
     const fs::path source = scan->scan;
     const std::optional<EditRecipe> edits = scan->edits;
-    const std::vector<EditPlace> places = uncertain_in(*scan);
+    std::vector<EditPlace> places;
+    if (scan->uncertainty) places = uncertain_in(*scan->structures, *scan->uncertainty);
+    const std::string network = scan->network.string();
     scan.reset();
     if (edits) apply_edits(document, *edits, io.context);
     io.end_progress();
@@ -137,10 +158,16 @@ struct EditWindowCommand {
     options.title = "Osteotome edit - " + folder.filename().string();
     options.state_file = p.state_file;
     options.places = places;
+    options.network = network;
     Saver saver(folder, source, io.common.threads);
     EditWindowActions actions;
     actions.save = [&](const std::string& text) { saver.begin(text); };
     actions.saved = [&] { return saver.ended(); };
+    actions.find = [&](const Image& ct, const std::string& folder, const Context& context) {
+      Context threads = context;
+      threads.threads = io.common.threads;
+      return found_by(ct, folder, threads);
+    };
     actions.stop = [&] { return io.context.cancelled(); };
     const int gl_errors = run_edit_window(document, options, actions);
     if (io.context.cancelled()) throw Error(ExitCode::cancelled, "ended from outside; what was not saved is lost");

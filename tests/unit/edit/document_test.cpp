@@ -264,6 +264,58 @@ TEST(EditDocument, StructuresAreAddedPaintedChangedAndDeleted) {
   EXPECT_EQ(d.hash(), start);
 }
 
+// What a network finds comes as one step, in place of structures of the same names.
+TEST(EditDocument, StructuresOfALabelMapAreOneStep) {
+  const Image ct = walnut({20, 18, 16});
+  EditDocument d(ct, start_of(ct, 300));
+  d.apply(AddStructureEdit{4, "nerve", {9, 8, 7}, StructureRole::landmark});
+  d.apply(BrushEdit{4, false, 1, {ct.frame.world_from_index({3, 3, 3})}});
+  const std::string before = d.hash();
+  Labels found;
+  found.frame = ct.frame;
+  const auto v = make_voxels<std::uint8_t>(ct.frame.voxel_count());
+  std::fill_n(v.get(), ct.frame.voxel_count(), std::uint8_t{0});
+  // The sinus where the old nerve was: deleting the one must not take of the other.
+  v[static_cast<std::ptrdiff_t>(found.offset(3, 3, 3))] = 2;
+  v[static_cast<std::ptrdiff_t>(found.offset(9, 9, 9))] = 1;
+  found.voxels = v;
+  found.structures = {{.value = 1, .name = "nerve", .rgb = {1, 2, 3}},
+                      {.value = 2, .name = "sinus", .rgb = {4, 5, 6}},
+                      {.value = 3, .name = "none", .rgb = {}}};
+  const EditOutcome done = d.apply_together(structures_of(found, d), "structures by a network");
+  EXPECT_TRUE(done.changed);
+  EXPECT_EQ(d.steps(), 3U);
+  EXPECT_EQ(d.undo_text(), "structures by a network");
+  ASSERT_EQ(d.structures().size(), 2U);
+  ASSERT_NE(d.structure(4), nullptr);
+  EXPECT_EQ(d.structure(4)->is.name, "nerve");
+  EXPECT_EQ(d.structure(4)->is.rgb, (std::array<std::uint8_t, 3>{9, 8, 7}));
+  EXPECT_EQ(d.structure(4)->role, StructureRole::landmark);
+  EXPECT_EQ(d.labels()[found.offset(9, 9, 9)], 4);
+  EXPECT_EQ(d.labels()[found.offset(3, 3, 3)], d.structures()[0].is.value);
+  EXPECT_EQ(d.structures()[0].is.name, "sinus");
+  EXPECT_DOUBLE_EQ(d.volume_mm3(4), ct.frame.voxel_volume_mm3());
+  const std::string after = d.hash();
+  EXPECT_TRUE(d.undo());
+  EXPECT_EQ(d.hash(), before);
+  EXPECT_EQ(d.redo_text(), "structures by a network");
+  EXPECT_TRUE(d.redo());
+  EXPECT_EQ(d.hash(), after);
+  // What a file holds of it leads there as well.
+  EditDocument again(ct, start_of(ct, 300));
+  apply_edits(again, recipe_of(d));
+  EXPECT_EQ(again.hash(), after);
+
+  // One that cannot be done undoes those before it.
+  const std::vector<EditOperation> bad{DeleteStructureEdit{4}, VoxelsEdit{4, "0 1"}};
+  EXPECT_THROW(d.apply_together(bad, "x"), Error);
+  EXPECT_THROW(d.apply_together({ThresholdEdit{}}, "x"), Error);
+  EXPECT_EQ(d.hash(), after);
+  EXPECT_EQ(d.steps(), 3U);
+  found.frame.origin_mm.x += 1;
+  EXPECT_THROW(static_cast<void>(structures_of(found, d)), Error);
+}
+
 TEST(EditDocument, TakesOverStructuresAlsoFromAnotherGrid) {
   const Image ct = walnut({40, 30, 20});
   Labels coarse_map;

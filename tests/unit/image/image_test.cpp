@@ -340,6 +340,49 @@ TEST(Phantom, AnotherIndividualIsAnotherHead) {
   EXPECT_FALSE(std::equal(a.labels.span().begin(), a.labels.span().end(), b.labels.span().begin()));
 }
 
+// A bent tube, and what is said of it by name.
+TEST(Structures, AShapeThatItsNameCannotHaveIsTold) {
+  const auto tube = [](double radius, double length_mm, double gap_mm, const std::string& name, double spacing = 0.5) {
+    Labels l;
+    l.frame = {{60, 90, 100}, {spacing, spacing, spacing}, {-10, 3, 7}, {}};
+    const auto v = make_voxels<std::uint8_t>(l.frame.voxel_count());
+    std::size_t n = 0;
+    for (int k = 0; k < l.frame.dims[2]; ++k)
+      for (int j = 0; j < l.frame.dims[1]; ++j)
+        for (int i = 0; i < l.frame.dims[0]; ++i, ++n) {
+          const Vec3 p = Vec3{double(i) - 30, double(j) - 6, double(k) - 6} * spacing;
+          // Up, and half of it back: an L of two straight parts.
+          const double leg = length_mm / 2, z = std::clamp(p.z, 0.0, leg), y = std::clamp(p.y, 0.0, leg);
+          const bool in = std::min(length(p - Vec3{0, 0, z}), length(p - Vec3{0, y, leg})) <= radius;
+          v[static_cast<std::ptrdiff_t>(n)] = in && !(p.z > leg / 2 && p.z < leg / 2 + gap_mm) ? 3 : 0;
+        }
+    l.voxels = v;
+    l.structures = {{.value = 3, .name = name}};
+    return l;
+  };
+  const auto said = [](const Labels& l) { return implausible_shape(l, l.structures.front()); };
+  const StructureShape shape = shape_of(tube(0.9, 34, 0, "facial nerve"), 3);
+  EXPECT_NEAR(shape.length_mm, 34, 3);
+  EXPECT_NEAR(shape.width_mm, 1.8, 0.25);
+  EXPECT_EQ(shape.largest_share, 1);
+  EXPECT_FALSE(shape.cut_off);
+  EXPECT_EQ(said(tube(0.9, 34, 0, "facial nerve")), "");
+  EXPECT_NE(said(tube(0.9, 16, 0, "facial nerve")).find("mm of length"), std::string::npos);
+  EXPECT_NE(said(tube(1.4, 34, 0, "Left_Facial-Nerve")).find("mm of width"), std::string::npos);
+  EXPECT_NE(said(tube(0.9, 34, 3, "facial nerve")).find("in one piece"), std::string::npos);
+  EXPECT_NE(said(tube(0.9, 34, 0, "sigmoid sinus")).find("less than 500"), std::string::npos);
+  EXPECT_EQ(said(tube(0.9, 16, 3, "some tumour")), "");
+  // Where the image ends it may be short.
+  Labels cut = tube(0.9, 16, 0, "facial nerve");
+  const auto v = make_voxels<std::uint8_t>(cut.frame.voxel_count());
+  constexpr std::size_t kDown = 6U * 60 * 90;  // its lower end lies at the lowest slice then
+  for (std::size_t n = 0; n < cut.frame.voxel_count(); ++n)
+    v[static_cast<std::ptrdiff_t>(n)] = n + kDown < cut.frame.voxel_count() ? cut.voxels[n + kDown] : 0;
+  cut.voxels = v;
+  EXPECT_TRUE(shape_of(cut, 3).cut_off);
+  EXPECT_EQ(said(cut), "");
+}
+
 TEST(Structures, AVolumeThatItsNameCannotHaveIsTold) {
   EXPECT_EQ(implausible_volume("facial nerve", 80), "");
   EXPECT_NE(implausible_volume("Left Facial_Nerve", 4000).find("look at it"), std::string::npos);

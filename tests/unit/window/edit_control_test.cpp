@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -340,6 +341,56 @@ TEST(CutPicture, DrawsGreyOutlineAndStructures) {
   d.show(1, false);
   draw_cut(view, d, look, pixels);
   EXPECT_EQ(at(c), grey);
+}
+
+TEST(EditControl, WhatANetworkFindsIsOneStepAndItsDoubtfulPlacesAreListed) {
+  Editor e;
+  EditFound found;
+  found.structures.frame = e.ct.frame;
+  const auto v = make_voxels<std::uint8_t>(e.ct.frame.voxel_count());
+  std::fill_n(v.get(), e.ct.frame.voxel_count(), std::uint8_t{0});
+  v[40] = 7;
+  found.structures.voxels = v;
+  found.structures.structures = {{.value = 7, .name = "facial nerve", .rgb = {250, 220, 50}}};
+  found.places = {{{1, 2, 3}, 7, "facial nerve", 5}};
+  found.note = "facial nerve differs";
+  e.control.find_structures("structures by ear", [&](const Context& context) {
+    context.progress(0.5);
+    return found;
+  });
+  EXPECT_TRUE(e.control.busy());
+  EXPECT_NE(e.control.message().find("structures by ear"), std::string::npos);
+  e.settle();
+  EXPECT_EQ(e.document.steps(), 1U);
+  EXPECT_EQ(e.document.undo_text(), "structures by ear");
+  ASSERT_EQ(e.document.structures().size(), 1U);
+  ASSERT_EQ(e.control.places.size(), 1U);
+  // Its value in the document, not the network's.
+  EXPECT_EQ(e.control.places[0].structure, e.document.structures()[0].is.value);
+  EXPECT_EQ(e.document.labels()[40], e.document.structures()[0].is.value);
+  EXPECT_NE(e.control.message().find("facial nerve differs"), std::string::npos);
+  EXPECT_TRUE(e.control.unsaved());
+  e.control.undo();
+  EXPECT_TRUE(e.document.structures().empty());
+
+  // Esc stops it, and an error is said; the document stays as it is in both.
+  std::atomic<bool> begun{false};
+  e.control.find_structures("structures by ear", [&](const Context& context) -> EditFound {
+    begun = true;
+    for (;;) {
+      context.check_cancelled();
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  while (!begun) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  e.control.cancel();
+  e.settle();
+  EXPECT_EQ(e.control.message(), "stopped; nothing was changed");
+  e.control.find_structures("structures by ear",
+                            [](const Context&) -> EditFound { throw Error(ExitCode::no_input, "no network there"); });
+  e.settle();
+  EXPECT_EQ(e.control.message(), "no network there");
+  EXPECT_EQ(e.document.steps(), 0U);
 }
 
 TEST(EditWorker, TheLatestPictureWins) {

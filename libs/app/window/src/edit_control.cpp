@@ -349,6 +349,26 @@ bool EditControl::add_structure(const std::string& name) {
   return true;
 }
 
+void EditControl::find_structures(const std::string& what, std::function<EditFound(const Context&)> work) {
+  if (refuse_when_busy()) return;
+  if (document_.in_stroke()) reported(document_.end_stroke());
+  finding_ = what;
+  message_ = what + " ...";
+  worker_.find(std::move(work));
+}
+
+// The values of what was found are the network's; the document has its own.
+void EditControl::take_found(EditFound found) {
+  const EditOutcome done = document_.apply_together(structures_of(found.structures, document_), finding_);
+  places = std::move(found.places);
+  for (EditPlace& p : places) {
+    for (const EditStructure& s : document_.structures())
+      if (s.is.name == p.name) p.structure = s.is.value;
+  }
+  if (!done.changed && found.note.empty()) found.note = tr("nothing changes");
+  message_ = finding_ + (found.note.empty() ? "" : ": " + found.note);
+}
+
 void EditControl::show_structure(int value, bool shown) {
   document_.show(value, shown);
   hidden_changed_ = redraw_ = true;
@@ -461,7 +481,7 @@ std::string EditControl::hint() const {
 }
 
 void EditControl::reported(const EditOutcome& o) {
-  const std::initializer_list<Place> places{
+  const std::initializer_list<Place> words{
       {"what", o.text}, {"added", volume_text(o.added_mm3)}, {"removed", volume_text(o.removed_mm3)}, {"note", o.note}};
   const char* text = tr("{what}: nothing changes");
   if (!o.changed) {
@@ -471,7 +491,7 @@ void EditControl::reported(const EditOutcome& o) {
   } else {
     text = o.removed_mm3 > 0 ? tr("{what}: {removed} removed") : "{what}";
   }
-  message_ = filled(text, places);
+  message_ = filled(text, words);
   if (o.changed && !o.note.empty()) message_ += " (" + o.note + ")";
 }
 
@@ -480,6 +500,12 @@ void EditControl::tick() {
     if (done->error) {
       message_ = done->error->code() == ExitCode::cancelled ? tr("stopped; nothing was changed")
                                                             : std::string(done->error->what());
+    } else if (done->found) {
+      try {
+        take_found(std::move(*done->found));
+      } catch (const Error& e) {
+        message_ = e.what();
+      }
     } else {
       reported(document_.commit(std::move(*done->plan)));
     }

@@ -2,6 +2,7 @@
 // VTK.
 #pragma once
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -76,6 +77,10 @@ class EditControl {
   /// What is done at once: structures. False, with a message, where it is rejected.
   bool at_once(const EditOperation& operation);
   bool add_structure(const std::string& name);
+  /// Structures by something that runs beside the window; they come as one step when it has ended. `what` names it.
+  void find_structures(const std::string& what, std::function<EditFound(const Context&)> work);
+  /// What should be looked at first, the worst first.
+  std::vector<EditPlace> places;
   void undo();
   void redo();
   void cancel();
@@ -115,6 +120,7 @@ class EditControl {
   [[nodiscard]] bool refuse_when_busy();
   void ask_preview();
   void reported(const EditOutcome& outcome);
+  void take_found(EditFound found);
 
   EditDocument& document_;
   EditWorker worker_;
@@ -127,7 +133,7 @@ class EditControl {
   int held_view_ = -1;
   Vec3 box_from_mm_;
   EditTool tool_ = EditTool::look;
-  std::string message_;
+  std::string message_, finding_;
   std::uint64_t saved_version_, drawn_version_, preview_version_ = ~0ULL;
   std::optional<ThresholdEdit> preview_live_;
   bool hidden_changed_ = false, redraw_ = true;

@@ -63,6 +63,7 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   tools(control);
   options(control);
   greys(control);
+  wishes.find = network(control);
   places(control);
   structures(control);
   if (!low) {
@@ -222,10 +223,10 @@ void EditPanel::options(EditControl& control) {
 // The network's own word on where it may be wrong; what was corrected since is still listed, to be looked at again.
 void EditPanel::places(EditControl& control) {
   first_place_ = {};
-  if (places_.empty()) return;
+  if (control.places.empty()) return;
   kit_heading(tr("Uncertain boundaries: look here first"));
-  for (std::size_t n = 0; n < places_.size(); ++n) {
-    const EditPlace& p = places_[n];
+  for (std::size_t n = 0; n < control.places.size(); ++n) {
+    const EditPlace& p = control.places[n];
     ImGui::PushID(static_cast<int>(n));
     const std::string words =
         filled(tr("{structure}, {n} voxels"), {{"structure", tr(p.name)}, {"n", std::to_string(p.voxels)}});
@@ -239,6 +240,19 @@ void EditPanel::places(EditControl& control) {
     }
     ImGui::PopID();
   }
+}
+
+// Structures by a trained network, in place of those of the same names. True: it was asked for.
+bool EditPanel::network(const EditControl& control) {
+  find_button_ = {};
+  if (!can_find_) return false;
+  kit_heading(tr("Trained network"));
+  const bool entered = kit_field("##network", tr("folder of the network"), network_);
+  const bool pressed = wide_button(tr("Find structures"), !control.busy() && !network_.empty());
+  tip(tr("in place of those of the same names, as one step; Esc stops it"));
+  const ImVec2 lo = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
+  find_button_ = {lo.x, lo.y, size.x, size.y};
+  return (entered || pressed) && !network_.empty();
 }
 
 // Its colour, which a click changes; true once the picker is closed or let go.

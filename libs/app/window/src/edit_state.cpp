@@ -23,6 +23,8 @@ void write_edit_state(const EditWindowState& s, const EditControl& control, cons
   Json structures = Json::list();
   for (const EditStructure& e : control.document().structures())
     structures.push_back({{"value", e.is.value}, {"name", e.is.name}, {"shown", e.shown}});
+  Json places = Json::list();
+  for (const EditPlace& p : control.places) places.push_back({{"name", p.name}, {"at_mm", list(p.at_mm)}});
   const EditDocument& d = control.document();
   Json j{{"pictures", s.pictures},
          {"size", {s.width, s.height}},
@@ -50,6 +52,10 @@ void write_edit_state(const EditWindowState& s, const EditControl& control, cons
          {"triangles", s.triangles},
          {"threshold_slider", s.threshold_slider},
          {"first_place", s.first_place},
+         {"find_button", s.find_button},
+         {"places", std::move(places)},
+         {"progress", control.progress()},
+         {"undo", d.undo_text()},
          {"worst_ms", s.worst_ms}};
   add_drawn(j);
   const std::filesystem::path beside = file.string() + ".new";

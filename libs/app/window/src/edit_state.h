@@ -24,7 +24,7 @@ struct EditWindowState {
   double worst_ms =
       0;  ///< longest that the window took over one picture since it opened, waiting for the screen left out
   std::size_t triangles = 0;
-  std::array<float, 4> threshold_slider{}, first_place{};  ///< x, y, width, height
+  std::array<float, 4> threshold_slider{}, first_place{}, find_button{};  ///< x, y, width, height
 };
 
 /// As JSON, in place of what was there; a reader sees the one or the other. What cannot be written is left out.

@@ -60,7 +60,10 @@ class EditWindow {
       : control_(document), actions_(actions), state_file_(options.state_file) {
     open(options);
     if (!state_file_.empty()) keep_places();
-    panel_.set_places(options.places);
+    control_.places = options.places;
+    panel_.set_network(
+        static_cast<bool>(actions.find),
+        options.network.empty() ? PersonSettings(PersonSettings::usual_file()).values.network : options.network);
     scene_ = std::make_unique<EditScene>();
     glGenTextures(3, textures_.data());
     for (const unsigned t : textures_) {
@@ -222,6 +225,7 @@ class EditWindow {
     ImGui::NewFrame();
     const EditPanel::Wishes wishes = panel_.draw(control_, panel_width(), static_cast<float>(height_), saving_);
     if (wishes.save) save();
+    if (wishes.find) find_structures();
     wants_close_ = wants_close_ || wishes.close;
     status_bar();
     if (control_.show_help) help();
@@ -255,7 +259,8 @@ class EditWindow {
                             worst_ms_,
                             scene_->triangles(),
                             panel_.threshold_slider(),
-                            panel_.first_place()};
+                            panel_.first_place(),
+                            panel_.find_button()};
       write_edit_state(state, control_, state_file_);
     }
   }
@@ -376,6 +381,14 @@ class EditWindow {
     if (row->does == EditKey::from_front) scene_->look_from({0, -other, 0.05});
     if (row->does == EditKey::from_left) scene_->look_from({other, 0, 0.05});
     if (row->does == EditKey::from_above) scene_->look_from({0, -0.02, other});
+  }
+
+  void find_structures() {
+    const std::string folder = panel_.network(), name = std::filesystem::path(folder).filename().string();
+    control_.find_structures(filled(tr("structures by {network}"), {{"network", name}}),
+                             [find = actions_.find, ct = control_.document().ct(), folder](const Context& context) {
+                               return find(ct, folder, context);
+                             });
   }
 
   void save() {

@@ -76,13 +76,21 @@ EditWorker::~EditWorker() {
 }
 
 bool EditWorker::plan(const EditDocument& document, std::vector<EditOperation> operations) {
+  return begin({&document, std::move(operations), nullptr});
+}
+
+bool EditWorker::find(std::function<EditFound(const Context&)> work) {
+  return begin({nullptr, {}, std::move(work)});
+}
+
+bool EditWorker::begin(Job job) {
   if (planning_) return false;
   planning_ = true;
   {
     const std::lock_guard lock(mutex_);
     cancel_plan_ = false;
     progress_ = 0;
-    job_ = Job{&document, std::move(operations)};
+    job_ = std::move(job);
   }
   wake_.notify_all();
   return true;
@@ -128,7 +136,10 @@ void EditWorker::plan_loop() {
     }
     Planned done;
     try {
-      done.plan = job->document->plan(std::move(job->operations), context);
+      if (job->find)
+        done.found = job->find(context);
+      else
+        done.plan = job->document->plan(std::move(job->operations), context);
     } catch (const Error& e) {
       done.error = e;
     } catch (const std::exception& e) {

@@ -3,6 +3,7 @@
 #pragma once
 #include <atomic>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "osteo/app/window/edit_window.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/data/tri_mesh.h"
 #include "osteo/imaging/edit/document.h"
@@ -55,8 +57,11 @@ class EditWorker {
   [[nodiscard]] double progress() const { return progress_.load(); }
   /// It ends soon, with an Error(cancelled).
   void cancel_plan() { cancel_plan_ = true; }
+  /// Works out structures beside the window, as `plan` does bone.
+  bool find(std::function<EditFound(const Context&)> work);
   struct Planned {
     std::optional<BonePlan> plan;
+    std::optional<EditFound> found;
     std::optional<Error> error;
   };
   [[nodiscard]] std::optional<Planned> take_plan();
@@ -77,7 +82,9 @@ class EditWorker {
   struct Job {
     const EditDocument* document;
     std::vector<EditOperation> operations;
+    std::function<EditFound(const Context&)> find;  // in place of these
   };
+  bool begin(Job job);
   std::optional<Job> job_;
   std::optional<Planned> planned_;
   std::atomic<bool> cancel_plan_{false}, cancel_preview_{false};

@@ -1,8 +1,10 @@
 #include "osteo/imaging/edit/document.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "bone_operations.h"
@@ -17,6 +19,10 @@ namespace {
 using edit_inside::Recorder;
 using edit_inside::Step;
 using edit_inside::Structures;
+
+std::string text_of(const Step& step) {
+  return step.text.empty() ? operation_text(step.operations.front()) : step.text;
+}
 
 }  // namespace
 
@@ -84,6 +90,32 @@ EditOutcome EditDocument::apply(const EditOperation& operation, const Context& c
   const Structures before = s.structures;
   s.run_on_structures(operation, recorder);
   Step step{{operation}, true, {}, recorder.changes(s.labels.words()), {}};
+  if (before != s.structures) step.structures = {before, s.structures};
+  outcome.changed = !step.labels.empty() || step.structures.has_value();
+  if (outcome.changed) s.push(std::move(step));
+  return outcome;
+}
+
+EditOutcome EditDocument::apply_together(const std::vector<EditOperation>& operations, const std::string& text) {
+  State& s = *state_;
+  if (s.stroke) throw Error(ExitCode::failed, "a stroke is being drawn");
+  for (const EditOperation& o : operations) {
+    require_valid(o);
+    if (changes_bone(o)) throw Error(ExitCode::usage, "only operations on structures are applied together");
+  }
+  EditOutcome outcome;
+  outcome.text = text;
+  Recorder recorder;
+  const Structures before = s.structures;
+  Step step{operations, true, {}, {}, {}, text};
+  try {
+    for (const EditOperation& o : operations) s.run_on_structures(o, recorder);
+  } catch (...) {
+    recorder.changes(s.labels.words()).apply(s.labels.words());
+    s.structures = before;
+    throw;
+  }
+  step.labels = recorder.changes(s.labels.words());
   if (before != s.structures) step.structures = {before, s.structures};
   outcome.changed = !step.labels.empty() || step.structures.has_value();
   if (outcome.changed) s.push(std::move(step));
@@ -200,10 +232,10 @@ bool EditDocument::can_redo() const {
   return !state_->undone.empty() && !state_->stroke;
 }
 std::string EditDocument::undo_text() const {
-  return can_undo() ? operation_text(state_->done.back().operations.front()) : std::string();
+  return can_undo() ? text_of(state_->done.back()) : std::string();
 }
 std::string EditDocument::redo_text() const {
-  return can_redo() ? operation_text(state_->undone.back().operations.front()) : std::string();
+  return can_redo() ? text_of(state_->undone.back()) : std::string();
 }
 
 bool EditDocument::undo(const Context& context) {
@@ -316,6 +348,42 @@ std::string hash_of(const Image& ct) {
   h.add(&ct.frame.direction, sizeof ct.frame.direction);
   h.add(ct.voxels.get(), ct.span().size_bytes());
   return h.hex();
+}
+
+std::vector<EditOperation> structures_of(const Labels& labels, const EditDocument& document) {
+  if (!(labels.frame.dims == document.ct().frame.dims && same_place(labels.frame, document.ct().frame)))
+    throw Error(ExitCode::usage, "the label map does not lie on the voxels of the CT", "make it from this CT");
+  std::array<bool, 256> taken{};
+  taken[0] = true;
+  for (const EditStructure& s : document.structures()) taken[s.is.value] = true;
+  std::vector<EditOperation> all, drawn;
+  for (const Structure& found : labels.structures) {
+    const auto& now = document.structures();
+    const auto same =
+        std::find_if(now.begin(), now.end(), [&](const EditStructure& s) { return s.is.name == found.name; });
+    VoxelsEdit voxels = voxels_of(labels, found.value, 0);
+    if (voxels.runs.empty()) continue;
+    AddStructureEdit add;
+    add.name = found.name;
+    add.rgb = {found.rgb[0], found.rgb[1], found.rgb[2]};
+    if (same != now.end()) {
+      add.structure = same->is.value;
+      add.rgb = {same->is.rgb[0], same->is.rgb[1], same->is.rgb[2]};
+      add.role = same->role;
+      all.emplace_back(DeleteStructureEdit{add.structure});
+    } else {
+      const auto free = std::find(taken.begin(), taken.end(), false);
+      if (free == taken.end()) throw Error(ExitCode::usage, "255 structures are all there can be");
+      *free = true;
+      add.structure = static_cast<int>(free - taken.begin());
+    }
+    voxels.structure = add.structure;
+    all.emplace_back(add);
+    drawn.emplace_back(std::move(voxels));
+  }
+  // Drawn last: a structure that goes takes none of those voxels with it.
+  all.insert(all.end(), std::make_move_iterator(drawn.begin()), std::make_move_iterator(drawn.end()));
+  return all;
 }
 
 VoxelsEdit voxels_of(const Labels& labels, std::uint8_t value, int structure) {

@@ -70,6 +70,7 @@ struct Step {
   bool remembered = true;  // false: what it changed was forgotten to save memory
   WordChanges bone, labels;
   std::optional<std::pair<Structures, Structures>> structures;  // before and after
+  std::string text{};                                           // of several operations; empty: the first one's
   [[nodiscard]] std::size_t memory_bytes() const {
     std::size_t n = sizeof *this + bone.memory_bytes() + labels.memory_bytes();
     for (const EditOperation& o : operations) {

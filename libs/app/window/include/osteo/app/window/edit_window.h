@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "osteo/core/base/context.h"
+#include "osteo/core/data/volume.h"
 #include "osteo/imaging/edit/document.h"
 
 namespace osteo::inline app {
@@ -24,8 +26,16 @@ struct EditWindowOptions {
   double scale = 0;                ///< of text; 0: as the monitor has it. Times what the person chose.
   std::string title;
   std::vector<EditPlace> places;  ///< listed in this order
+  std::string network;            ///< folder of a trained network that is proposed; empty: none
   std::filesystem::path
       state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
+};
+
+/// What was found in the scan: label map on its grid, with names, and where it should be looked at first.
+struct EditFound {
+  Labels structures;
+  std::vector<EditPlace> places;  ///< by the label map's values
+  std::string note;               ///< what is not to be trusted; may be empty
 };
 
 /// How a save ended.
@@ -40,6 +50,8 @@ struct EditWindowActions {
   std::function<void(const std::string& edits)> save;
   /// How the save ended, once; nothing while it is at work or none was begun.
   std::function<std::optional<EditSaved>()> saved;
+  /// Runs the trained network of a folder on a CT, on another thread; empty: there is no such action.
+  std::function<EditFound(const Image& ct, const std::string& network, const Context& context)> find;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
 };

@@ -75,6 +75,9 @@ class EditDocument {
   /// One step of one operation. Errors: usage for values out of range or a structure that is not there; cancelled, and
   /// then nothing is done.
   EditOutcome apply(const EditOperation& operation, const Context& context = {});
+  /// One step of several operations on structures, which `text` names for undo and redo: all, or with an error none.
+  /// Error(usage) also where one of them is on bone.
+  EditOutcome apply_together(const std::vector<EditOperation>& operations, const std::string& text);
   /// One step of several operations on bone, worked out beside the document, which others may read meanwhile. Made true
   /// by `commit`, which takes no time, unless the document was changed since (Error(failed)).
   [[nodiscard]] BonePlan plan(std::vector<EditOperation> operations, const Context& context = {}) const;
@@ -132,6 +135,9 @@ struct BonePlan {
 
 /// Content hash of a CT with its grid: what edits are bound to.
 [[nodiscard]] std::string hash_of(const Image& ct);
+/// The structures of a label map on the document's grid as operations: each in place of one of the same name, whose
+/// role and colour stay, else new. What has no voxels is left out. Error(usage): another grid, or more than 255 in all.
+[[nodiscard]] std::vector<EditOperation> structures_of(const Labels& labels, const EditDocument& document);
 /// The voxels of one value as an operation; empty runs when there are none.
 [[nodiscard]] VoxelsEdit voxels_of(const Labels& labels, std::uint8_t value, int structure);
 
