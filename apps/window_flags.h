@@ -117,18 +117,19 @@ struct WindowFlags {
     visit({"hand_scale", "movement in the scene for 1 mm of the hand, with --device marker", "", 0.05, 10},
           p.hand_scale);
     visit({"second_device",
-           "device that moves the second hand; keys: a suction tube and water come beside the drill while V and I are "
-           "held, "
-           "with --dust"},
+           "device that moves the second hand; keys: a suction tube comes beside the drill while V is held, water from "
+           "one "
+           "I to the next"},
           p.second_device);
     visit({"second_instrument",
            "instrument of the second hand where it has a device of its own: suction tube 10 Fr, irrigator 2 mm, probe "
            "1 mm, "
            "a burr"},
           p.second_instrument);
-    visit(
-        {"dust", "bone dust: falls, piles up and hides the bone until it is sucked off; with water it becomes a paste"},
-        p.dust);
+    visit({"dust",
+           "bone dust from the first tick on: falls, piles up and hides the bone until it is sucked off; with water it "
+           "becomes a paste"},
+          p.dust);
     visit({"heat",
            "how warm drilling makes bone and structures, on a guess of what share of a burr's work heats bone "
            "(docs/validation/heat.md; nothing "
@@ -222,7 +223,7 @@ struct WindowFlags {
 
 /// What begins a session of these flags, at its first tick: how the patient lies, where it is not on the back.
 inline std::vector<SceneAction> first_actions(const WindowFlags& flags) {
-  if (!flags.dust || (flags.position == Posture::supine && flags.head_turned_deg == 0)) return {};
+  if (flags.position == Posture::supine && flags.head_turned_deg == 0) return {};
   return {SceneAction::posture(down_of(flags.position, flags.head_turned_deg))};
 }
 

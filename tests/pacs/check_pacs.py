@@ -15,18 +15,15 @@ try:
 except ImportError as e:
     print(f"skipped: {e}")
     sys.exit(77)
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from free_port import free_port
+
 part, bin_dir, work = sys.argv[1], *(pathlib.Path(a).resolve() for a in sys.argv[2:4])
 osteo = bin_dir / "osteo"
 shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
 os.environ["PATH"] += ":/usr/sbin"  # where Debian has Orthanc
 os.chdir(work)
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 def run(*args, rc=0):

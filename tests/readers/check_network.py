@@ -16,6 +16,9 @@ except ImportError as e:
     print(f"skipped: {e}; ./test installs the readers when PyPI can be reached")
     sys.exit(77)
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from free_port import free_port
+
 bin_dir, fixtures, work = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
 seconds = float(sys.argv[4]) if len(sys.argv) > 4 else 4
 shutil.rmtree(work, ignore_errors=True)
@@ -26,12 +29,6 @@ def osteo(*args, **more):
     return subprocess.run(
         [bin_dir / "osteo", *map(str, args), "--quiet"], check=True, cwd=work, capture_output=True, text=True, **more
     ).stdout
-
-
-def free_port(kind=socket.SOCK_STREAM):
-    with socket.socket(socket.AF_INET, kind) as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 # pyigtl knows neither of these; their contents are read here by the specification, headers and checksums by pyigtl.

@@ -3,9 +3,12 @@
 waits for a server, shows every sample, goes on when the server went and came again, and its keys do what they say.
 usage: drive_console.py BIN_DIR WORK_DIR [PICTURES]    with PICTURES it keeps pictures there, at three sizes"""
 
-import csv, json, os, pathlib, shutil, signal, socket, subprocess, sys, time
+import csv, json, os, pathlib, shutil, signal, subprocess, sys, time
 
 from driver import *
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from free_port import free_port
 
 bin_dir, work = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
 pictures = pathlib.Path(sys.argv[3]).resolve() if len(sys.argv) > 3 else None
@@ -20,12 +23,6 @@ def osteo(*args):
     return subprocess.run(
         [bin_dir / "osteo", *map(str, args), "--quiet"], check=True, cwd=work, capture_output=True, text=True
     ).stdout
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 osteo("phantom", "ct.nrrd", "--labels-out", "l.nrrd", "--region", "temporal", "--spacing-mm", 1)

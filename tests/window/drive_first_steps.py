@@ -148,10 +148,13 @@ def first_steps():
         step("Retract", retract)
         step("Tilt", tilt)
         s = step("Zoom", zoom)
-        assert s["next_step"] == "Cut" and "Suction" not in s["steps_done"], s
+        assert s["next_step"] == "Cut" and "Suction" not in s["steps_done"] and not any(s["down"]), s
+        # Who asks for water has it, and bone dust with it, from that tick on.
+        w.key("i", "water", lambda s: s["washing"] and any(s["down"]))
+        w.key("i", "no water", lambda s: not s["washing"])
         w.close()
-    for folder in ("first", "second"):
-        closed(folder)
+    closed("first")
+    assert "dust_mm3" in closed("second")[0]
     summary = json.loads(pathlib.Path("first/summary.json").read_text())
     assert summary["dust_mm3"]["sucked_off"] > 0.05 and summary["sawn_mm3"] > 10, summary
     for name, said, seconds in table:

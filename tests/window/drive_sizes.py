@@ -5,6 +5,9 @@ usage: drive_sizes.py sizes BIN_DIR WORK_DIR SOURCE_DIR"""
 
 from drive_window import *  # what it drives with; the arguments are the same
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from free_port import free_port
+
 SIZES = [(1024, 700), (1280, 800)]
 
 
@@ -105,14 +108,6 @@ def others(size, scale, theme):
     finally:
         live.send_signal(signal.SIGINT)
         live.wait(PATIENCE_S)
-
-
-def free_port():
-    import socket
-
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 def sizes():

@@ -363,13 +363,20 @@ def keys():
             "bone whole again",
             lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0,
         )["session"]
-        # What a session keeps from its beginning: another continues from here, seen from the same side.
+        # Heat and dust begin and end where they are switched, in the same session. The procedure it keeps from its
+        # beginning: another continues from here, seen from the same side.
         eye = w.drag(3, 40, 10)["eye"]
         w.key("F10", "the settings, where they were left", lambda s: s["settings"] == "operation")
-        setting("heat", "needs another session", lambda s: "another" in s["rows"] and not s["hottest_c"])
-        warm = setting("another", "has heat", lambda s: s["hottest_c"] > 30 and s["session"] != third)
-        assert apart(warm["eye"], eye) < 1e-6 and not warm["settings"], (warm, eye)
-        fourth = warm["session"]
+        setting("heat", "from here on", lambda s: s["hottest_c"] > 30)
+        setting("dust", "gone", lambda s: not any(s["down"]))
+        again = setting("dust", "from here on", lambda s: any(s["down"]))
+        assert again["session"] == third and "another" not in again["rows"], again
+        w.item("Procedure", "its list", lambda s: "Window into the mastoid" in s["items"])
+        w.item("Window into the mastoid", "needs another session", lambda s: "another" in s["rows"])
+        other = setting("another", "has it", lambda s: s["session"] != third and s["tick"] > 0 and not s["settings"])
+        assert apart(other["eye"], eye) < 1e-6, (other, eye)
+        w.until("goes on as it was", lambda s: s["hottest_c"] > 30 and any(s["down"]))
+        fourth = other["session"]
         pressed.update({"q", "Left", "Right"})  # of the page at the end: main_view()
         said = w.close()
     for s in ("first", first, second, third, fourth):
@@ -379,7 +386,7 @@ def keys():
     assert closed(first)[1]["actions"] == 0
     assert any(r["hand"] == "1" and r["pedal"] == "255" for r in ticks(first))
     assert closed(second)[0]["sawn_mm3"] > 10
-    assert closed(third)[1]["actions"] == 0
+    assert closed(third)[1]["actions"] == 6  # each of three switches after a hold
     closed(fourth)
     assert (pathlib.Path(second) / "session.json").read_text().count("resumed_from") == 1
     osteo("export", "first", "first.csv")

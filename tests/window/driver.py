@@ -88,9 +88,11 @@ class Program:
 
         def still(state):
             nonlocal last
-            at = state["items"].get(words)
-            before, last = last, at
-            return at is not None and at == before
+            at, picture = state["items"].get(words), state["pictures"]
+            if last is not None and picture == last[1]:
+                return False  # the same picture says nothing new
+            before, last = last, (at, picture)
+            return at is not None and before is not None and at == before[0]
 
         at = self.until(f"'{words}' is there", still)["items"][words]
         x("mousemove", *map(round, at))

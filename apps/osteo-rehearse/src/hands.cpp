@@ -14,7 +14,7 @@ bool is_space_mouse(const HidInfo& info) {
 
 }  // namespace
 
-Hands::Hands(const WindowFlags& flags) : hand_(flags.device), dust_(flags.dust) {
+Hands::Hands(const WindowFlags& flags) : hand_(flags.device) {
   bool puck = false;
   for (const FoundDevice& f : find_devices()) {
     const bool mouse = f.model == DeviceModel::space_mouse || f.model == DeviceModel::space_mouse_wireless;
@@ -61,7 +61,6 @@ CameraDevices Hands::camera(Device* first, bool lend) const {
 std::vector<std::unique_ptr<Device>> Hands::make(const HandGoal& start, Vec3 near_mm) const {
   std::vector<std::unique_ptr<Device>> all;
   all.push_back(make_one(hand_, 0, start, near_mm));
-  if (second_ == Hand::mouse && !dust_) return all;
   HandGoal beside = start;
   const Vec3 off = any_perpendicular(from_floats(start.axis)) * 15;
   beside.position_mm += off;

@@ -20,7 +20,7 @@ class Hands {
   /// What there is for the camera. `first`: the drill's device, where one runs.
   [[nodiscard]] CameraDevices camera(Device* first, bool lend) const;
   /// `start`: where the drill's hand waits. `near_mm`: where an arm's tool is when it is first heard of; its reach is
-  /// small. The second hand waits beside the first; moved by keys it is there for dust alone.
+  /// small. The second hand waits beside the first, so that suction and water can begin at any time.
   [[nodiscard]] std::vector<std::unique_ptr<Device>> make(const HandGoal& start, Vec3 near_mm) const;
   [[nodiscard]] std::string name() const;
 
@@ -39,7 +39,6 @@ class Hands {
                                                  Vec3 near_mm) const;
 
   Hand hand_, second_ = Hand::mouse;
-  bool dust_;
   int found_ = 0;
   std::uint8_t second_tool_ = 0;
   WoodenHapticsGeometry geometry_;

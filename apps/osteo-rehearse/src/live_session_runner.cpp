@@ -34,9 +34,8 @@ LiveSessionRunner::LiveSessionRunner(const WindowFlags& flags)
   if (!flags.resume.empty() && joins())
     throw Error(ExitCode::usage, "--resume does not go with --join",
                 "the session is the host's; leave one of them out");
-  if (flags.dust && (hosts_ || joins()))
-    throw Error(ExitCode::usage, "--dust does not go with --tutor and --join",
-                "its second hand would be a third; leave it out");
+  if (flags.dust && joins())
+    throw Error(ExitCode::usage, "--dust does not go with --join", "the host switches it for all; leave it out");
   if (flags.monitor && joins()) throw Error(ExitCode::usage, "--monitor does not go with --join", "the host has it");
   if (hosts_) code_ = make_pairing_code();
   if (!joins()) return;

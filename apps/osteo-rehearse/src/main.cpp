@@ -207,6 +207,9 @@ struct WindowCommand {
     actions.stop = [&] { return io.context.cancelled(); };
     actions.monitor = [&] { return session_runner.monitor(); };
     actions.turn_monitor = [&](bool on) { return session_runner.turn_monitor(on); };
+    const bool own = p.join.empty() && p.review.empty();
+    if (own) actions.simulate = [&](Simulated what, bool on) { session_runner.simulate(what, on); };
+    const PersonValues before = person.values;
     if (p.tutor || !p.join.empty() || !p.playback.empty()) {
       actions.tutor = [&] { return session_runner.tutor(); };
       actions.steps = [&](const std::vector<std::string>& injured) { return session_runner.steps(injured); };
@@ -225,6 +228,10 @@ struct WindowCommand {
       throw;
     }
     session_runner.save_at_exit(false);
+    if (!own) {  // as the host had them
+      person.values.dust = before.dust;
+      person.values.heat = before.heat;
+    }
     person.values.sound = session_runner.sound().on();
     person.values.volume = session_runner.sound().volume();
     person.values.alarms = session_runner.sound().alarms();
@@ -250,8 +257,6 @@ struct WindowCommand {
       throw Error(ExitCode::usage, "--review takes the session's <case> too", "osteo rehearse CASE --review SESSION");
     if (!p.experiment.empty() && p.experiment != "camera")
       throw Error(ExitCode::usage, "--experiment: there is no '" + p.experiment + "'", "'camera' is the only one");
-    if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))
-      io.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
     if (p.mirror && p.procedure.empty())
       throw Error(ExitCode::usage, "--mirror has no effect without --procedure", "add it, or leave it out");
     std::optional<Procedure> procedure = procedure_of(p);  // what is wrong with it is said without a window
@@ -295,10 +300,7 @@ struct WindowCommand {
         if (!choice) break;
         take_switches(person.values, flags);
         flags.tutor = choice->teach;
-        if (flags.tutor) {
-          flags.listen = person.values.lessons_at;
-          flags.dust = person.values.dust = false;  // its second hand would be a third
-        }
+        if (flags.tutor) flags.listen = person.values.lessons_at;
       }
       flags.resume = choice->resume;
       left = {false, {}, false, left.changed ? left.view : std::nullopt};

@@ -282,6 +282,7 @@ void SessionRunner::run(World world, std::vector<std::unique_ptr<Device>> device
       header.bone_hash = world.hash();
       header.rate_hz = options_.rate_hz;
       header.haptics = options_.haptics;
+      header.dust = options_.follow.dust;
     }
     if (live_.hosts() && procedure_ != nullptr && options_.anatomy.structures)
       progress_ = std::make_unique<ProcedureProgress>(*procedure_, *options_.anatomy.structures, world.copy());
@@ -318,6 +319,9 @@ void SessionRunner::save_now() {
   const std::shared_ptr<Rehearsal> over = std::move(rehearsal_);
   const std::unique_ptr<MonitorController> monitor = std::move(monitor_);  // hears it to its end, and goes before it
   last_ = session_.folder;
+  // The next one goes on as this one was.
+  options_.follow.dust = over->simulates(Simulated::dust);
+  options_.follow.heat = over->simulates(Simulated::heat);
   RehearsalSummary s;
   try {
     live_.leave();
@@ -379,6 +383,10 @@ void SessionRunner::want_monitor() {
   monitor_options_.emplace();
   monitor_options_->setup = parse_monitor(monitor_json_.empty() ? default_monitor_json() : monitor_json_,
                                           monitor_setup_.empty() ? "the built-in monitor" : monitor_setup_.string());
+}
+
+void SessionRunner::simulate(Simulated what, bool on) {
+  if (rehearsal_) rehearsal_->act(SceneAction::simulate(what, on));
 }
 
 bool SessionRunner::turn_monitor(bool on) {

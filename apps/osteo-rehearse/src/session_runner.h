@@ -70,6 +70,8 @@ class SessionRunner {
   [[nodiscard]] MonitorController* monitor() const { return monitor_.get(); }
   /// While a rehearsal runs, or for the next. False: a stream has the one there is, or the host's is the only one.
   bool turn_monitor(bool on);
+  // Dust or heat of the session that runs begins or ends, a few ticks later.
+  void simulate(Simulated what, bool on);
   [[nodiscard]] std::string device() const { return hands_.name(); }
   [[nodiscard]] CameraDevices camera(bool lend) const {
     return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend);

@@ -194,6 +194,14 @@ TEST(Script, ActionsAreReadAndErrorsSayWhich) {
   EXPECT_NEAR(actions[51].transform().rotation.column[0].y, 1, 1e-12);
   EXPECT_NEAR(actions[26].transform().shift_mm.z, 5, 1e-12);
   EXPECT_EQ(actions.back().transform().rotation.column[0], (Vec3{0, 1, 0}));
+  // Each that is named, in this order.
+  const auto switched = actions_of(with(R"({"t_s": 1, "simulate": {"heat": true, "dust": false}})"), 1000);
+  ASSERT_EQ(switched.size(), 2u);
+  EXPECT_TRUE(switched[0].is(ActionKind::simulate) && switched[1].is(ActionKind::simulate));
+  EXPECT_EQ(switched[0].item, static_cast<std::uint32_t>(Simulated::dust));
+  EXPECT_EQ(switched[0].values[0], 0);
+  EXPECT_EQ(switched[1].item, static_cast<std::uint32_t>(Simulated::heat));
+  EXPECT_EQ(switched[1].values[0], 1);
   // As version 0.1 called them; not both.
   const Script old =
       with(R"({"t_s": 5, "attach": {"plate": "miniplate-4", "at_mm": [0, 0, 1], "x": [0, 1, 0], "pieces": [0, 1]}})");
@@ -412,6 +420,8 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   expect(with_action("{ \"t_s\": 0.2, \"suction\": { \"radius_mm\": 5 } }"), "7", "\"at_mm\" is missing");
   EXPECT_EQ(with_action("{ \"t_s\": 0.2, \"suction\": { \"mm3_per_s\": 0 } }"), "read");
   expect(with_action("{ \"t_s\": 0.2, \"irrigate\": { \"mm3_per_s\": 50 } }"), "7", "\"at_mm\" is missing");
+  expect(with_action("{ \"t_s\": 0.2, \"simulate\": {} }"), "7", "it names neither");
+  expect(with_action("{ \"t_s\": 0.2, \"simulate\": { \"water\": true } }"), "7", "\"water\" is not known");
   expect(with_action("{ \"t_s\": 0.2, \"open\": { \"number\": 1, \"opening_mm\": -3 } }"), "7", "\"opening_mm\" is -3");
   EXPECT_EQ(with_action("{ \"t_s\": 5000, \"split\": {} }"), "read");
   EXPECT_EQ(load_script(path).seconds(), 5000);

@@ -166,6 +166,10 @@ TEST(ScriptedScene, WarningsAboutAScript) {
   s.actions = {{0.1, SceneAction::irrigate({0, 0, 5}, 5, 1)}};
   EXPECT_NE(warnings(s).find("--dust"), std::string::npos);
   EXPECT_EQ(warnings(s, true), "");
+  s.actions.push_back({0.05, SceneAction::simulate(Simulated::heat, true)});
+  EXPECT_NE(warnings(s).find("--dust"), std::string::npos);
+  s.actions.push_back({0.05, SceneAction::simulate(Simulated::dust, true)});
+  EXPECT_EQ(warnings(s), "") << "it begins there";
 }
 
 }  // namespace

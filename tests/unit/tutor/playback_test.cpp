@@ -299,6 +299,14 @@ TEST_F(Playbacks, WhatHandsDoNotRepeatIsRefusedAndSaysWhen) {
   EXPECT_NE(refused(at / "moved.oss", 0, 0).find("at 1 s the session has 'move'"), std::string::npos);
   EXPECT_EQ(refused(at / "moved.oss", 0, 0.9), "");
   EXPECT_EQ(refused(at / "moved.oss", 1.1, 0), "");
+  // Dust that began meanwhile begins in the lesson too; what began before it is as the lesson's own session has it.
+  SceneAction dust = SceneAction::simulate(Simulated::dust, true);
+  dust.tick = 1000;
+  record(groove(), at / "dust.oss", {dust});
+  EXPECT_EQ(refused(at / "dust.oss", 0, 0), "");
+  ASSERT_EQ(read_lesson(SessionReader(at / "dust.oss"), 0.5, 0).actions.size(), 1U);
+  EXPECT_EQ(read_lesson(SessionReader(at / "dust.oss"), 0.5, 0).actions.front().tick, 500U);
+  EXPECT_TRUE(read_lesson(SessionReader(at / "dust.oss"), 1.1, 0).actions.empty());
   // A guided session is none to be led by: whose hand would it be?
   play(expert, {}, 100, at / "led.oss");
   EXPECT_NE(refused(at / "led.oss", 0, 0).find("'guide'"), std::string::npos);

@@ -103,6 +103,18 @@ TEST_F(WetBone, AWashedPatchIsDarkerThanDryBesideItUntilItDries) {
   EXPECT_TRUE(again.rgb == dry.rgb);
 }
 
+TEST_F(WetBone, WithoutDustItIsDryAtOnce) {
+  const Picture dry = draw();
+  wash(3);
+  for (int s = 0; s < 300; ++s) dust.step();
+  ASSERT_TRUE(update());
+  EXPECT_FALSE(draw().rgb == dry.rgb);
+  EXPECT_TRUE(film.clear());
+  view.wet(surface);
+  EXPECT_TRUE(draw().rgb == dry.rgb);
+  EXPECT_FALSE(film.clear()) << "there is nothing more to dry";
+}
+
 TEST_F(WetBone, MirrorsTheLamp) {
   // Of the washed patch, over the darkest that it is, as one looks from above and around.
   const auto brightest = [&] {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <imgui_internal.h>
 
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <set>
@@ -86,6 +87,32 @@ TEST(Kit, NamesInOtherScriptsAreDrawn) {
   // Broken UTF-8 of a folder's name takes nothing with it.
   need_letters("a\xE7\x8E");
   need_letters("\xFF\xFE");
+}
+
+// A window that is open for days: of a thousand names the letters that were not drawn for long go, others stay.
+TEST(Kit, LettersOfLongAgoAreForgotten) {
+  const InLanguage english(Language::english);
+  const Memory memory(800, 600, 16);
+  const auto known = [](unsigned c) {
+    return ImGui::GetIO().Fonts->Fonts[0]->FindGlyphNoFallback(static_cast<ImWchar>(c)) != nullptr;
+  };
+  std::string many;  // 王 is among them
+  for (unsigned c = 0x7000; c < 0x7800; ++c)
+    many += {static_cast<char>(0xE0 | c >> 12), static_cast<char>(0x80 | (c >> 6 & 0x3F)),
+             static_cast<char>(0x80 | (c & 0x3F))};
+  frames([&] { need_letters(many); });
+  EXPECT_TRUE(letters_missing());
+  set_ui_style(16);
+  EXPECT_FALSE(letters_missing());
+  EXPECT_TRUE(known(0x738B));
+  for (int n = 0; n < 700; ++n) frames([] { need_letters("\u5C0F"); });
+  set_ui_style(16);
+  EXPECT_FALSE(known(0x738B)) << "not drawn for 700 pictures";
+  EXPECT_TRUE(known(0x5C0F)) << "drawn in the last";
+  need_letters("\u738B");
+  EXPECT_TRUE(letters_missing()) << "and asked for again when it is drawn again";
+  set_ui_style(16);
+  EXPECT_TRUE(known(0x738B) && known(0x5C0F)) << "few are kept";
 }
 
 // Twice the size on the largest screen, in the language with most letters.
@@ -291,6 +318,68 @@ TEST(Kit, ANarrowChoiceTakesTheNext) {
 }
 
 // What a file says beyond a slider's ends stays until a hand moves the knob.
+// Small values have as much of the track as large ones.
+TEST(Kit, ARootSliderIsFineWhereValuesAreSmall) {
+  const Memory memory(800, 600, 16);
+  double at = 1000;
+  ImVec2 lo, hi;
+  const auto picture = [&] {
+    ImGui::NewFrame();
+    begin_fixed("kit", {0, 0, 400, 200});
+    const bool changed = kit_root_slider("Stiffness", "?", at, 0, 1000);
+    lo = ImGui::GetItemRectMin();
+    hi = ImGui::GetItemRectMax();
+    ImGui::End();
+    ImGui::Render();
+    return changed;
+  };
+  EXPECT_FALSE(picture());
+  const float from = lo.x + 8, wide = hi.x - lo.x - 16;
+  ImGui::GetIO().MousePos = {from + 0.5F * wide, hi.y - 14};
+  EXPECT_FALSE(picture());
+  ImGui::GetIO().MouseDown[0] = true;
+  EXPECT_TRUE(picture());
+  EXPECT_NEAR(at, 125, 4) << "half of the track is an eighth of the values";
+  ImGui::GetIO().MousePos = {from + 0.1F * wide, hi.y - 14};
+  EXPECT_TRUE(picture());
+  EXPECT_NEAR(at, 1, 0.2);
+}
+
+// A square opens colours and sliders; what is pressed there is the colour at once.
+TEST(Kit, AColourIsChosenFromSomeOrMixed) {
+  const Memory memory(800, 600, 16);
+  keep_places();
+  std::array<float, 3> rgb{1, 1, 1};
+  int changes = 0;
+  const auto picture = [&] {
+    ImGui::NewFrame();
+    begin_fixed("kit", {0, 0, 400, 200});
+    changes += kit_colour("the bone's", rgb) ? 1 : 0;
+    ImGui::End();
+    ImGui::Render();
+  };
+  const auto click = [&](const char* what) {
+    for (int n = 0; n < 3; ++n) picture();  // where a popup is, is known after its first
+    ASSERT_TRUE(kept_places().contains(what)) << what;
+    const auto [x, y] = kept_places().at(what);
+    ImGui::GetIO().MousePos = {x, y};
+    for (const bool down : {false, true, false, false}) {
+      ImGui::GetIO().MouseDown[0] = down;
+      picture();
+    }
+  };
+  picture();
+  EXPECT_FALSE(kept_places().contains("Red"));
+  click("colour");
+  EXPECT_EQ(changes, 0) << "nothing is chosen yet";
+  click("usual");  // the last of them
+  EXPECT_EQ(changes, 1);
+  EXPECT_EQ(rgb, (std::array<float, 3>{0.75F, 0.75F, 0.78F}));
+  click("Red");  // in the middle of its slider
+  EXPECT_NEAR(rgb[0], 0.5F, 0.02F);
+  EXPECT_EQ(rgb[1], 0.75F);
+}
+
 TEST(Kit, ASliderLeavesAValueBeyondItsEnds) {
   const Memory memory(800, 600, 16);
   for (const double given : {-800.0, 3000.0}) {

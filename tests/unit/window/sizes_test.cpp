@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <set>
@@ -16,7 +18,9 @@
 #include "imgui_memory.h"
 #include "osteo/core/base/translate.h"
 #include "scope_panel.h"
+#include "scratch.h"
 #include "settings_dialog.h"
+#include "start_view.h"
 #include "tutor_panel.h"
 #include "ui_kit.h"
 #include "ui_style.h"
@@ -109,10 +113,10 @@ void expect_apart(const std::map<std::string, ScreenBox>& boxes) {
 }
 
 // What was drawn onto the picture itself in the last picture.
-ScreenBox on_picture() {
+ScreenBox on_picture(bool front = false) {
   ScreenBox box{1e9F, 1e9F, 0, 0};
   float right = 0, bottom = 0;
-  const ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  const ImDrawList& list = front ? *ImGui::GetForegroundDrawList() : *ImGui::GetBackgroundDrawList();
   for (const ImDrawVert& v : list.VtxBuffer) {
     box.x = std::min(box.x, v.pos.x);
     box.y = std::min(box.y, v.pos.y);
@@ -174,6 +178,7 @@ void expect_a_place_for_everything(bool monitor) {
         draw_tray(l.tray, hand, false, latched, pressed);
         const ScreenBox card = draw_burr_card(l.view, l.free_width(), hand, burr_unfolded, pressed);
         if (!l.over[0].empty()) static_cast<void>(draw_cuts_foot(cuts_foot_box(l), l.over[1].empty(), 0, false, {}));
+        draw_cut_tile(l.cut_tile, false, pressed);
         static_cast<void>(draw_next_step(l.view, l.free_width(), card, steps, step_unfolded));
       };
       for (const Nearness n : {Nearness::near, Nearness::close, Nearness::touched, Nearness::far}) {
@@ -185,6 +190,7 @@ void expect_a_place_for_everything(bool monitor) {
       for (std::size_t c = 0; c < 3; ++c) {
         if (!l.over[c].empty()) boxes["cut " + std::to_string(c)] = l.over[c];
       }
+      EXPECT_NE(boxes.contains("cut"), boxes.contains("cut 0")) << "a cut, or what brings one";
       if (!monitor) {
         EXPECT_TRUE(boxes.contains("cuts' foot"));
         EXPECT_FALSE(l.over[0].empty());
@@ -260,6 +266,7 @@ TEST(Sizes, TeachIsWhole) {
         draw_tray(l.tray, hand, false, latched, pressed);
         const ScreenBox card = draw_burr_card(l.view, l.free_width(), hand, burr_unfolded, pressed);
         if (!l.over[0].empty()) static_cast<void>(draw_cuts_foot(cuts_foot_box(l), l.over[1].empty(), 0, false, {}));
+        draw_cut_tile(l.cut_tile, false, pressed);
         static_cast<void>(draw_next_step(l.view, l.free_width(), card, steps, step_unfolded));
         panel.draw(now, hands, harm, l.view, nowhere, pressed);
       };
@@ -270,6 +277,19 @@ TEST(Sizes, TeachIsWhole) {
       for (std::size_t c = 0; c < 3; ++c) {
         if (!l.over[c].empty()) boxes["cut " + std::to_string(c)] = l.over[c];
       }
+      EXPECT_NE(boxes.contains("cut"), boxes.contains("cut 0")) << "a cut, or what brings one";
+      expect_apart(boxes);
+      const Message told{Message::Rank::harm, tr("the drill is on its way: change the burr when it has arrived")};
+      screen.draw([&] { draw_state(l, drilling(Nearness::close), told, pressed); });
+      // For a while it may lie on what is a key away and on the step, never on the burr, the cut or the people.
+      const ScreenBox behind = on_picture(), front = on_picture(true), message = behind.empty() ? front : behind;
+      if (!message.empty()) {
+        EXPECT_GE(message.x, l.view.x);
+        EXPECT_LE(message.right(), l.view.right());
+        if (l.view.height >= 200 * unit()) boxes["message"] = message;
+      }
+      if (!front.empty()) boxes.erase("cut");
+      boxes.erase("first steps");
       expect_apart(boxes);
       now.teaches = false;
       const ViewLayout taught = screen.lay_out(Layout::operate);
@@ -335,6 +355,49 @@ TEST(Sizes, ListsAndQuestionsAreWhole) {
            }))
         ADD_FAILURE() << "cut: " << text;
       EXPECT_TRUE(screen.windows().contains(tr("Reset bone?")));
+    });
+  }
+}
+
+// The page that a case is chosen on: a case, a session, a CT, a network and a folder, each chosen in turn. Where it has
+// no room beside the list its panel is below, by scrolling.
+TEST(Sizes, TheStartPageIsWhole) {
+  const test::ScratchFolder scratch;
+  const std::filesystem::path cases = scratch / "cases";
+  const auto write = [](const std::filesystem::path& file, const std::string& text) {
+    std::filesystem::create_directories(file.parent_path());
+    std::ofstream(file, std::ios::binary) << text;
+  };
+  write(cases / "left ear/manifest.json", "{}");
+  write(cases / "left ear/sessions/1/session.json", "{}");
+  write(cases / "3d_fullres/network.json", R"({"osteotome_network": 1})");
+  write(cases / "series/1.dcm", std::string(128, '\0') + "DICM");
+  std::filesystem::create_directories(cases / "empty");
+  StartOptions options;
+  options.folder = cases;
+  options.procedures = {{"mastoidectomy", "Cortical mastoidectomy with facial recess"},
+                        {"mandible-split", "Mandible sawn on both sides and drawn forward"}};
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    for_each([&](Size s, double by_hand) {
+      SCOPED_TRACE(std::string(enum_names(language)[static_cast<std::size_t>(language)]));
+      Screen screen(s, by_hand);
+      PersonSettings person(scratch / "settings.json");
+      person.values.remember_cases = true;
+      person.opened(cases / "left ear");
+      person.values.procedure = "mandible-split";
+      options.message = tr("no room for four pictures: a larger window or smaller text (Ctrl -) shows them");
+      StartPage page(person, options);
+      ASSERT_GE(page.list().entries().size(), 5U);
+      for (int n = 0; n < static_cast<int>(page.list().entries().size()); ++n) {
+        page.list().select(n);
+        SCOPED_TRACE(page.list().entries()[static_cast<std::size_t>(n)].words);
+        for (const std::string& text : screen.draw([&] { page.draw(screen.whole().width, screen.whole().height); }))
+          ADD_FAILURE() << "cut: " << text;
+        const std::map<std::string, ScreenBox> boxes = screen.windows();
+        EXPECT_TRUE(boxes.contains("start"));
+        expect_apart(boxes);
+      }
     });
   }
 }

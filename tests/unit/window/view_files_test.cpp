@@ -337,10 +337,22 @@ TEST(StartList, AFolderOfDicomIsAScan) {
 TEST(StartList, AFolderOfNnUNetIsATrainedNetwork) {
   const Folders f;
   const fs::path model = f.scratch / "cases/T__P__3d_fullres";
-  write(model / "plans.json", "{}");
+  write(model / "plans.json", R"({"configurations": {}})");
   EXPECT_EQ(look_at_path(model).kind, FolderKind::folder);
-  write(model / "dataset.json", "{}");
+  write(model / "dataset.json", R"({"labels": {}})");
   EXPECT_EQ(look_at_path(model).kind, FolderKind::network);
+  // Plans and a data set of something else, by the same names.
+  const fs::path other = f.scratch / "cases/holidays";
+  for (const char* const text : {"{}", "[1, 2]", "no JSON"}) {
+    write(other / "plans.json", text);
+    write(other / "dataset.json", R"({"labels": {}})");
+    EXPECT_EQ(look_at_path(other).kind, FolderKind::folder) << text;
+    write(other / "network.json", text);
+    EXPECT_EQ(look_at_path(other).kind, FolderKind::folder) << text;
+    fs::remove(other / "network.json");
+  }
+  write(other / "network.json", R"({"osteotome_network": 1})");
+  EXPECT_EQ(look_at_path(other).kind, FolderKind::network);
   StartList list({}, f.cases());
   list.select(index_of(list, "trained network: T__P__3d_fullres"));
   EXPECT_FALSE(list.open());

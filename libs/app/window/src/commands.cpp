@@ -4,6 +4,7 @@
 #include <cctype>
 
 #include "osteo/core/base/translate.h"
+#include "osteo/simulation/bone/action.h"
 #include "osteo/simulation/bone/burr_kind.h"
 #include "osteo/simulation/bone/posture.h"
 #include "palette.h"
@@ -51,6 +52,10 @@ constexpr Named kWater[] = {
     {tr_later("Second hand: suction, irrigation, probe, nothing"), tr_later("sucker irrigator instrument"),
      second_hand},
     {tr_later("Mouse moves the second hand"), tr_later("sucker"), second_mouse},
+    {tr_later("Bone dust and irrigation on or off"), tr_later("water simulate slurry"), simulate,
+     static_cast<int>(Simulated::dust)},
+    {tr_later("Heat of drilling on or off"), tr_later("temperature warm simulate"), simulate,
+     static_cast<int>(Simulated::heat)},
 };
 constexpr Named kTools[] = {
     {tr_later("Saw, at the bone under the mouse"), tr_later("osteotomy blade plane cut"), saw},

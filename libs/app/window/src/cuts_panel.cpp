@@ -9,6 +9,8 @@
 #include <cmath>
 #include <utility>
 
+#include "gl_texture.h"
+#include "grey_choice.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/display/view/instrument_view.h"
 #include "slice_overlay.h"
@@ -85,15 +87,7 @@ void note_look(Rehearsal& rehearsal, const StructuresView::One& s) {
 }  // namespace
 
 void CutsPanel::create() {
-  glGenTextures(CutsControl::kCuts, textures_.data());
-  for (const unsigned t : textures_) {
-    glBindTexture(GL_TEXTURE_2D, t);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  }
-  glBindTexture(GL_TEXTURE_2D, 0);
+  for (unsigned& t : textures_) t = make_texture();
 }
 
 void CutsPanel::release() {
@@ -228,11 +222,7 @@ void CutsPanel::lay_out(const ViewLayout& layout) {
 void CutsPanel::upload(DrawnCut cut) {
   const auto n = static_cast<std::size_t>(cut.cut);
   ++uploads_;
-  glBindTexture(GL_TEXTURE_2D, textures_[n]);
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, cut.view.width, cut.view.height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
-               cut.rgba.data());
-  glBindTexture(GL_TEXTURE_2D, 0);
+  put_pixels(textures_[n], cut.view.width, cut.view.height, 4, cut.rgba.data());
   cut.rgba = {};
   drawn_[n] = std::move(cut);
 }
@@ -276,26 +266,12 @@ void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
 
 void CutsPanel::header(const Rehearsal& rehearsal) {
   begin_fixed("Cuts", header_, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
-  const std::string presets[] = {tr("Bone"), tr("Soft"), tr("Temporal")};
-  ImGui::BeginGroup();
-  if (const int p = choice("preset", presets, control_.preset(), kSmallControl); p >= 0) control_.take_preset(p);
-  ImGui::EndGroup();
-  if (ImGui::IsItemHovered()) {
-    std::string help;
-    for (std::size_t p = 0; p < grey_presets().size(); ++p) {
-      const HuWindow& hu = grey_presets()[p].hu;
-      help +=
-          filled(tr("{name}: window {window}, level {level}"),
-                 {{"name", presets[p]}, {"window", shown_number(hu.width, 0)}, {"level", shown_number(hu.level, 0)}});
-      help += "\n";
-    }
-    help += tr("Drag with the right button in a cut to change it; right click: back to this.");
-    if (ct_ && !ct_->soft_tissue()) {
-      help += "\n";
-      help += tr("The case keeps CT values of bone only: soft tissue stays black without --scan.");
-    }
-    ImGui::SetTooltip("%s", help.c_str());
+  std::string help = tr("Drag with the right button in a cut to change it; right click: back to this.");
+  if (ct_ && !ct_->soft_tissue()) {
+    help += "\n";
+    help += tr("The case keeps CT values of bone only: soft tissue stays black without --scan.");
   }
+  if (const int p = grey_choice(control_.preset(), kSmallControl, 0, help); p >= 0) control_.take_preset(p);
   const float side = kSmallControl * unit(), gap = 4 * unit();
   bool first = true;
   const auto is_pressed = [&](const char* icon, bool on, const std::string& words) {

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "grey_choice.h"
 #include "osteo/core/base/translate.h"
+#include "osteo/display/view/slices.h"
 #include "ui_kit.h"
 
 namespace osteo::inline app {
@@ -31,14 +33,6 @@ Pair pair_of(const std::string& first, const std::string& second) {
 
 void tip(const std::string& words) {
   if (ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) ImGui::SetTooltip("%s", words.c_str());
-}
-
-// Small values have as much of the track as large ones: by the cube root, for volumes also from nothing on.
-bool root_slider(const char* name, const std::string& shown, double& value, double lo, double hi) {
-  double root = std::cbrt(value);
-  if (!kit_slider(name, shown, root, std::cbrt(lo), std::cbrt(hi), (std::cbrt(hi) - std::cbrt(lo)) / 200)) return false;
-  value = std::clamp(root * root * root, lo, hi);
-  return true;
 }
 
 std::string with_number(const char* text, double value, int decimals) {
@@ -121,22 +115,13 @@ void EditPanel::greys(EditControl& control) {
   kit_text(filled(tr("window {window}, level {level} HU"),
                   {{"window", shown_number(control.hu.width, 0)}, {"level", shown_number(control.hu.level, 0)}}),
            theme().text);
-  const std::string names[] = {tr("Bone"), tr("Soft"), tr("Temporal")};
   int now = -1;
-  std::string all;
   for (std::size_t i = 0; i < grey_presets().size(); ++i) {
-    const GreyPreset& p = grey_presets()[i];
-    if (p.hu.width == control.hu.width && p.hu.level == control.hu.level) now = static_cast<int>(i);
-    all += (all.empty() ? "" : "\n") +
-           filled(tr("{name}: window {window}, level {level} (F{key})"), {{"name", names[i]},
-                                                                          {"window", shown_number(p.hu.width, 0)},
-                                                                          {"level", shown_number(p.hu.level, 0)},
-                                                                          {"key", std::to_string(i + 2)}});
+    const HuWindow& hu = grey_presets()[i].hu;
+    if (hu.width == control.hu.width && hu.level == control.hu.level) now = static_cast<int>(i);
   }
-  ImGui::BeginGroup();
-  const int pressed = choice("greys", names, now);
-  ImGui::EndGroup();
-  tip(all);
+  constexpr int kFirstKey = 2;  // F2
+  const int pressed = grey_choice(now, kControl, kFirstKey);
   if (pressed >= 0) control.key(EditKeyRow{0, EditKey::preset, pressed});
 }
 
@@ -176,8 +161,8 @@ void EditPanel::options(EditControl& control) {
       kit_text(tr("Click a piece of bone: it goes. Shift-click: all others go."), theme().quiet);
       return;
     case EditTool::pieces: {
-      static_cast<void>(
-          root_slider(tr("smaller than"), with_number("{n} mm³", control.pieces_mm3, 0), control.pieces_mm3, 0, 5000));
+      static_cast<void>(kit_root_slider(tr("smaller than"), with_number("{n} mm³", control.pieces_mm3, 0),
+                                        control.pieces_mm3, 0, 5000));
       double largest = control.pieces_largest;
       if (kit_slider(tr("largest that stay"), largest < 0.5 ? tr("all") : with_number("{n}", largest, 0), largest, 0,
                      1000, 1))
@@ -194,8 +179,8 @@ void EditPanel::options(EditControl& control) {
       if (wide_button(tr("Keep only inside"), free)) control.apply(BoxChoice::keep_inside);
       return;
     case EditTool::fill:
-      static_cast<void>(
-          root_slider(tr("cavities up to"), with_number("{n} mm³", control.fill_mm3, 0), control.fill_mm3, 0, 20000));
+      static_cast<void>(kit_root_slider(tr("cavities up to"), with_number("{n} mm³", control.fill_mm3, 0),
+                                        control.fill_mm3, 0, 20000));
       if (wide_button(tr("Fill (Enter)"), free, main)) control.apply();
       return;
     case EditTool::smooth:
@@ -208,7 +193,7 @@ void EditPanel::options(EditControl& control) {
     case EditTool::brush:
     case EditTool::eraser: {
       double diameter = 2 * control.brush_radius_mm;
-      if (root_slider(tr("Diameter"), with_number("{n} mm", diameter, 1), diameter, 0.4, 60))
+      if (kit_root_slider(tr("Diameter"), with_number("{n} mm", diameter, 1), diameter, 0.4, 60))
         control.brush_radius_mm = diameter / 2;
       const EditStructure* const s = control.document().structure(control.structure);
       kit_text(filled(control.tool() == EditTool::brush ? tr("adds to {structure} (choose below)")
@@ -255,18 +240,15 @@ bool EditPanel::network(const EditControl& control) {
   return (entered || pressed) && !network_.empty();
 }
 
-// Its colour, which a click changes; true once the picker is closed or let go.
+// Its colour, which a click changes; true once the mouse lets go.
 bool EditPanel::draw_colour(const EditStructure& s, std::array<float, 3>& rgb) {
   for (std::size_t c = 0; c < 3; ++c) rgb[c] = static_cast<float>(s.is.rgb[c]) / 255;
   if (coloured_ == s.is.value) rgb = colour_;
-  const float u = unit();
-  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {4 * u, (kRow * u - ImGui::GetFontSize()) / 2});
-  if (ImGui::ColorEdit3("##colour", rgb.data(), ImGuiColorEditFlags_NoInputs)) {
+  if (kit_colour("colour", rgb)) {
     coloured_ = s.is.value;
     colour_ = rgb;
   }
-  ImGui::PopStyleVar();
-  // One step for each drag in the picker, not one for each movement of the mouse.
+  // One step for each drag of a slider, not one for each movement of the mouse.
   if (coloured_ != s.is.value || ImGui::IsMouseDown(ImGuiMouseButton_Left)) return false;
   coloured_ = -1;
   return true;

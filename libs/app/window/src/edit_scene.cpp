@@ -13,6 +13,7 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 
+#include "gl_texture.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/imaging/io/vtk_data.h"
 
@@ -51,11 +52,7 @@ EditScene::EditScene() : impl_(std::make_unique<Impl>()) {
   set_up_scene(s.renderer);
   s.bone = make_bone_actor(to_vtk(TriMesh{}));
   s.renderer->AddActor(s.bone);
-  glGenTextures(1, &s.texture);
-  glBindTexture(GL_TEXTURE_2D, s.texture);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  glBindTexture(GL_TEXTURE_2D, 0);
+  s.texture = make_texture();
 }
 
 EditScene::~EditScene() {
@@ -122,9 +119,7 @@ unsigned EditScene::texture(int width, int height) {
     s.width = width;
     s.height = height;
     s.dirty = true;
-    glBindTexture(GL_TEXTURE_2D, s.texture);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE, nullptr);
-    glBindTexture(GL_TEXTURE_2D, 0);
+    put_pixels(s.texture, width, height, 3, nullptr);
   }
   if (s.dirty) {
     s.dirty = false;

@@ -22,6 +22,7 @@
 #include "edit_panel.h"
 #include "edit_scene.h"
 #include "edit_state.h"
+#include "gl_texture.h"
 #include "open_window.h"
 #include "osteo/app/window/person_settings.h"
 #include "osteo/core/base/error.h"
@@ -65,13 +66,7 @@ class EditWindow {
         static_cast<bool>(actions.find),
         options.network.empty() ? PersonSettings(PersonSettings::usual_file()).values.network : options.network);
     scene_ = std::make_unique<EditScene>();
-    glGenTextures(3, textures_.data());
-    for (const unsigned t : textures_) {
-      glBindTexture(GL_TEXTURE_2D, t);
-      glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-      glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    }
-    glBindTexture(GL_TEXTURE_2D, 0);
+    for (unsigned& t : textures_) t = make_texture(false);
     const auto* const renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
     const std::string name = renderer != nullptr ? renderer : "";
     if (name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos)
@@ -417,10 +412,7 @@ class EditWindow {
       if (redraw || !drawn || !same_picture(*drawn, control_.view(v))) {
         drawn = control_.view(v);
         draw_cut(control_.view(v), control_.document(), look, pixels_);
-        glBindTexture(GL_TEXTURE_2D, textures_[static_cast<std::size_t>(v)]);
-        glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, b.width, b.height, 0, GL_RGBA, GL_UNSIGNED_BYTE, pixels_.data());
-        glBindTexture(GL_TEXTURE_2D, 0);
+        put_pixels(textures_[static_cast<std::size_t>(v)], b.width, b.height, 4, pixels_.data());
       }
       const ImVec2 lo{static_cast<float>(b.x), static_cast<float>(b.y)},
           hi{static_cast<float>(b.x + b.width), static_cast<float>(b.y + b.height)};
@@ -490,11 +482,7 @@ class EditWindow {
                 h = std::min(680 * u, static_cast<float>(height_) - 16 * u);
     begin_card("Mouse and keys", {(static_cast<float>(width_) - w) / 2, (static_cast<float>(height_) - h) / 2, w, h},
                {16 * u, 16 * u});
-    ImGui::PushFont(bold_font());
-    ImGui::SetWindowFontScale(1.25F / kBoldEm);
-    ImGui::TextUnformatted(tr("Mouse and keys"));
-    ImGui::SetWindowFontScale(1);
-    ImGui::PopFont();
+    kit_title(tr("Mouse and keys"));
     ImGui::SameLine(w - 72 * u);
     if (tile("close", "x", {false, false, true, tr("Close (F1)")}, 40 * u)) control_.show_help = false;
     const float keys = std::min(400 * u, 0.4F * w);

@@ -1,5 +1,7 @@
 #include "gamepad.h"
 
+// It draws nothing: what needs GLEW before GL may follow in the same unit.
+#define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
 #include <cmath>

@@ -88,6 +88,7 @@ enum class Command {
   lead,          // the own hand is led by another, or not
   posture,       // value: Posture; how the patient lies
   colours,       // value: ThemeName
+  simulate,      // value: Simulated; begins, or ends
 };
 
 /// Keys that are down with another, as GLFW numbers them.

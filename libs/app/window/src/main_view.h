@@ -49,6 +49,7 @@ struct ViewScene {
   std::span<const StartProcedure> procedures;
   bool alone = true;  ///< nobody takes part from elsewhere: another session can be begun with other settings
   std::optional<WarmthNow> warmth;  ///< where the scene has heat
+  bool cut_over = false;            ///< one of the cuts has the picture's place
 };
 
 enum class EndChoice { none, again, resume, another, close };
@@ -72,6 +73,8 @@ class MainView {
   [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || palette_.typing(); }
   [[nodiscard]] const CommandPalette& palette() const { return palette_; }
   [[nodiscard]] bool asking() const { return asking_; }
+  /// There is one of the person's own, in the picture drawn last.
+  [[nodiscard]] bool second_hand() const { return second_hand_; }
   [[nodiscard]] bool wheel_open() const { return wheel_.open(); }
   /// The settings are open, and the keys are theirs.
   [[nodiscard]] bool in_settings() const { return focus_ == Focus::settings; }
@@ -155,7 +158,7 @@ class MainView {
   Focus focus_ = Focus::bone;
   bool focus_moved_ = false;               // and ImGui is to be told
   std::optional<std::size_t> wanted_cut_;  // a planned one, until the saw is there
-  bool asking_ = false, before_ = false, undone_ = false, write_focus_ = false;
+  bool second_hand_ = false, asking_ = false, before_ = false, undone_ = false, write_focus_ = false;
   bool lifting_ = false, lifted_ = false, pictured_ = false;  // for the first steps
   std::size_t undo_steps_ = 0;
   std::uint64_t times_undone_ = 0;

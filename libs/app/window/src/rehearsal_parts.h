@@ -112,6 +112,9 @@ class RehearsalWindow {
   void monitor_command(Command command);
   // What the person has chosen meanwhile, by keys or in the settings: hardware, monitor and session follow.
   void look_at_settings();
+  // Dust and heat, which begin and end in the session itself; whoever asks for water has it.
+  void look_at_simulation();
+  void use_water();
   [[nodiscard]] std::array<bool, 3> switches_now() const {
     return {sound_.on(), hints_.on(), monitor_controller() != nullptr};
   }
@@ -177,7 +180,8 @@ class RehearsalWindow {
   ReviewScene review_;
   HintController hints_;
   PersonSettings& person_;
-  std::array<bool, 3> switches_{};  // sound, hints, monitor: as the session has them noted
+  std::array<bool, 3> switches_{};   // sound, hints, monitor: as the session has them noted
+  std::array<bool, 2> simulated_{};  // by Simulated: as the session was asked to have it
   WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkSmartPointer<vtkRenderer> renderer_ = make_layered_renderer();

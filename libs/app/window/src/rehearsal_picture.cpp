@@ -63,8 +63,7 @@ void RehearsalWindow::show() {
     tools_->show(control_.tools(), tick, world, now.structures(), ImGui::GetTime());
   });
   draw_saw_line(control_.tools(), tools_->preview(), scene.project, cuts_.scene(), ImGui::GetBackgroundDrawList());
-  control_.wash(keyboard_.held(Command::suck) || main_view_.holds(Command::suck),
-                keyboard_.held(Command::wash) || main_view_.holds(Command::wash));
+  use_water();
   note_camera(now);
   hints_.frame(scope_.view().eye_mm(), ImGui::GetTime());
   hints_.draw(main_view_.free_room());
@@ -184,7 +183,8 @@ ViewScene RehearsalWindow::view_scene(Rehearsal& now) {
           [this] { controller_.draw(control_); },
           procedures_,
           tutor_.title.empty(),
-          warmth_};
+          warmth_,
+          cuts_.control().enlarged() >= 0};
 }
 
 // A point of the world in pixels of the window, from its upper left corner.

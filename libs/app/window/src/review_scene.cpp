@@ -14,6 +14,7 @@
 
 #include <algorithm>
 
+#include "gl_texture.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/simulation/camera/microscope.h"
 #include "palette.h"
@@ -97,22 +98,17 @@ void ReviewScene::take_picture(const PictureArea& area, int window_height) {
   const int width = std::max(1, static_cast<int>(wide)), height = std::max(1, static_cast<int>(high));
   std::vector<unsigned char> pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glReadBuffer(GL_BACK);
   glReadPixels(static_cast<int>(area.x + (area.width - wide) / 2),
                window_height - static_cast<int>(area.y + (area.height + high) / 2), width, height, GL_RGB,
                GL_UNSIGNED_BYTE, pixels.data());
   unsigned& picture = pictures_[*due_];
-  if (picture == 0) glGenTextures(1, &picture);
+  if (picture == 0) picture = make_texture();
+  put_pixels(picture, width, height, 3, pixels.data());
   glBindTexture(GL_TEXTURE_2D, picture);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
   glGenerateMipmap(GL_TEXTURE_2D);  // it is shown far smaller
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   glBindTexture(GL_TEXTURE_2D, 0);
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
   due_.reset();
   ++taken_;
 }

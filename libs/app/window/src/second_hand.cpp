@@ -8,7 +8,7 @@ namespace osteo::inline app {
 namespace {
 
 constexpr std::size_t kThings = 4;  // nothing is the first
-constexpr const char* kNone = tr_later("there is no second hand: --dust, or --second-device");
+constexpr const char* kNone = tr_later("there is no second hand in this session");
 
 MouseDevice* moved_by_window(Rehearsal& rehearsal) {
   return rehearsal.hands() > 1 ? dynamic_cast<MouseDevice*>(&rehearsal.device(1)) : nullptr;

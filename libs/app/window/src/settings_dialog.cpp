@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "hint_controller.h"
@@ -87,6 +89,8 @@ void choose_language(const std::string& name, std::string& value) {
   static_cast<void>(choose("language", name, words, ids, value, false));
 }
 
+}  // namespace
+
 void choose_procedure(const std::string& name, std::string& value, std::span<const StartProcedure> all) {
   std::vector<std::string> words{tr("none")}, ids{""};
   for (const StartProcedure& p : all) {
@@ -99,6 +103,8 @@ void choose_procedure(const std::string& name, std::string& value, std::span<con
   }
   static_cast<void>(choose("procedure", name, words, ids, value, false));
 }
+
+namespace {
 
 void choose_hints(std::string& off) {
   ImGui::Indent(16 * unit());
@@ -153,9 +159,20 @@ void choose_number(const SettingRow& row, const FieldDoc& doc, double& value) {
   static_cast<void>(kit_slider(name, percent(value), value, doc.lo, doc.hi, row.member == "scale" ? 0.1 : 0.05));
 }
 
+// To three figures, which are more than a hand feels.
+double rounded(double value) {
+  if (value == 0 || !std::isfinite(value)) return value;
+  const double last = std::pow(10, std::floor(std::log10(std::abs(value))) - 2);
+  return std::round(value / last) * last;
+}
+std::string figures(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return shown_figures(text);
+}
+
 // True when the user has changed it.
 bool draw_field(const FieldRef& f) {
-  const std::string id = "##" + std::string(f.doc.name);
   if (auto* const flag = std::get_if<bool*>(&f.target)) return kit_switch(std::string(f.doc.name), **flag);
   if (auto* const picked = std::get_if<FieldRef::Choice>(&f.target)) {
     const std::vector<std::string> words(picked->names.begin(), picked->names.end());
@@ -165,14 +182,9 @@ bool draw_field(const FieldRef& f) {
     return true;
   }
   double& value = **std::get_if<double*>(&f.target);
-  const auto speed = static_cast<float>(std::max(std::abs(value), 0.05) / 100);
-  const float wide = ImGui::GetContentRegionAvail().x, field = 96 * unit();
-  ImGui::AlignTextToFramePadding();
-  ImGui::TextUnformatted(shortened(std::string(f.doc.name), wide - field - 8 * unit(), ImGui::GetFontSize()).c_str());
-  ImGui::SameLine(wide - field);
-  ImGui::SetNextItemWidth(field);
-  return ImGui::DragScalar(id.c_str(), ImGuiDataType_Double, &value, speed, &f.doc.lo, &f.doc.hi, "%.4g",
-                           ImGuiSliderFlags_AlwaysClamp);
+  if (!kit_root_slider(std::string(f.doc.name), figures(value), value, f.doc.lo, f.doc.hi)) return false;
+  value = std::clamp(rounded(value), f.doc.lo, f.doc.hi);
+  return true;
 }
 
 void take_setting(Rehearsal& rehearsal, std::size_t n, const HapticsParams& params) {
@@ -198,9 +210,7 @@ std::span<const SettingRow> setting_rows() {
 }
 
 bool needs_another_session(const PersonValues& begun, const PersonValues& now) {
-  return begun.procedure != now.procedure ||
-         (!now.procedure.empty() && begun.mirror_procedure != now.mirror_procedure) || begun.dust != now.dust ||
-         begun.heat != now.heat;
+  return begun.procedure != now.procedure || (!now.procedure.empty() && begun.mirror_procedure != now.mirror_procedure);
 }
 
 void SettingsDialog::show(SettingsPage page, bool into) {

@@ -42,6 +42,9 @@ struct SettingsParts {
   bool another = false;  ///< needs_another_session(), and one can be begun: the dialog offers it
 };
 
+/// Into the current ImGui window: a list of them, with "none" first and a file of the person's last.
+void choose_procedure(const std::string& name, std::string& value, std::span<const StartProcedure> all);
+
 class SettingsDialog {
  public:
   /// With the keys' cursor on the page's name, or on the first of what it has (`into`).

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <system_error>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/json_document.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/session/scene/session_folder.h"
 
@@ -48,6 +52,25 @@ bool holds_dicom(const fs::path& folder) {
   return false;
 }
 
+// By what is in its files, as far as a picture may take: names alone are those of other plans and data sets too.
+// Whether it can be used is said where it is.
+bool is_network(const fs::path& folder) {
+  constexpr std::uintmax_t kMaxBytes = 4 << 20;
+  const auto json_of = [&](const char* name) -> std::optional<Json> {
+    std::error_code failed;
+    const std::uintmax_t bytes = fs::file_size(folder / name, failed);
+    if (failed || bytes > kMaxBytes) return std::nullopt;
+    std::ifstream in(folder / name, std::ios::binary);
+    return Json::parse(std::string(std::istreambuf_iterator<char>(in), {}));
+  };
+  const auto has = [](const std::optional<Json>& json, const char* key) { return json && json->find(key) != nullptr; };
+  std::error_code failed;
+  if (fs::is_regular_file(folder / "network.json", failed)) return has(json_of("network.json"), "osteotome_network");
+  if (!fs::is_regular_file(folder / "plans.json", failed) || !fs::is_regular_file(folder / "dataset.json", failed))
+    return false;
+  return has(json_of("plans.json"), "configurations") && has(json_of("dataset.json"), "labels");
+}
+
 bool can_be_looked_into(FolderKind kind) {
   return kind == FolderKind::folder || kind == FolderKind::scan || kind == FolderKind::network;
 }
@@ -71,7 +94,7 @@ FolderLook look_at_path(const fs::path& path) {
   const auto has = [&](const char* name) { return fs::is_regular_file(path / name, failed); };
   if (has("manifest.json")) return {FolderKind::the_case, path, {}};
   if (has("session.json")) return {FolderKind::session, path, {}};
-  if ((has("plans.json") && has("dataset.json")) || has("network.json")) return {FolderKind::network, path, {}};
+  if (is_network(path)) return {FolderKind::network, path, {}};
   if (holds_dicom(path)) return {FolderKind::scan, path, {}};
   return {FolderKind::folder, path, {}};
 }

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "gl_texture.h"
 #include "osteo/display/view/actors.h"
 
 namespace osteo::inline app {
@@ -48,7 +49,7 @@ void StereoScreen::draw(vtkRenderer* renderer, vtkGenericOpenGLRenderWindow* win
                         const PictureArea& area, int window_height) {
   const int width = static_cast<int>(area.width), height = static_cast<int>(area.height);
   if (width < 1 || height < 1) return;
-  if (textures_[0] == 0) glGenTextures(2, textures_.data());
+  if (textures_[0] == 0) textures_ = {make_texture(), make_texture()};
   for (int eye = 0; eye < 2; ++eye) {
     aim_eye(renderer, view, params, area, eye);
     renderer->ResetCameraClippingRange();
@@ -59,18 +60,15 @@ void StereoScreen::draw(vtkRenderer* renderer, vtkGenericOpenGLRenderWindow* win
     window->BlitDisplayFramebuffer();  // VTK's window shows nothing by itself
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glReadBuffer(GL_BACK);
-    glBindTexture(GL_TEXTURE_2D, textures_[static_cast<std::size_t>(eye)]);
+    const unsigned texture = textures_[static_cast<std::size_t>(eye)];
     if (width != width_ || height != height_) {
-      glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE, nullptr);
-      for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
-        glTexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
-      for (const GLenum edge : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
-        glTexParameteri(GL_TEXTURE_2D, edge, GL_CLAMP_TO_EDGE);
+      put_pixels(texture, width, height, 3, nullptr);
       if (eye == 1) {
         width_ = width;
         height_ = height;
       }
     }
+    glBindTexture(GL_TEXTURE_2D, texture);
     glCopyTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, static_cast<int>(area.x),
                         window_height - static_cast<int>(area.y) - height, width, height);
     glBindTexture(GL_TEXTURE_2D, 0);

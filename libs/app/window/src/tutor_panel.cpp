@@ -137,11 +137,7 @@ void draw_invitation(const std::string& text) {
   if (text.empty()) return;
   const Invitation invitation = invitation_of(text);
   kit_heading(tr("Invitation code"));
-  ImGui::PushFont(bold_font());
-  ImGui::SetWindowFontScale(kBoldEm / 1.25F);
-  ImGui::TextUnformatted(invitation.code.c_str());
-  ImGui::SetWindowFontScale(1);
-  ImGui::PopFont();
+  kit_title(invitation.code, 1.8F);
   // An address in one piece.
   std::string command = invitation.command;
   if (const std::size_t at = command.find(" --join"); at != std::string::npos) command[at] = '\n';
@@ -251,9 +247,7 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
     ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
     begin_fixed("tutoring", box_);
     ImGui::PopStyleVar();
-    ImGui::PushFont(bold_font());
-    kit_text(now.title, theme().text);
-    ImGui::PopFont();
+    kit_title(now.title, kBoldEm);
     draw_invitation(now.invitation);
     draw_people(now, hands);
     draw_guidance(now, pressed);

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "icon_lines.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -336,18 +337,83 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
   return at != before;
 }
 
+bool kit_root_slider(const std::string& name, const std::string& value, double& at, double least, double most) {
+  const double from = std::cbrt(least), to = std::cbrt(most);
+  double root = std::cbrt(at);
+  if (!kit_slider(name, value, root, from, to, (to - from) / 200)) return false;
+  at = std::clamp(root * root * root, least, most);
+  return true;
+}
+
+namespace {
+// True: pressed.
+bool swatch(const char* id, const std::array<float, 3>& rgb, float side) {
+  const float u = unit();
+  const Item i = item(id, {side * u, side * u});
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  draw->AddRectFilled(i.lo, i.hi, im_colour32({rgb[0], rgb[1], rgb[2]}), kRound * u);
+  draw->AddRect(i.lo, i.hi, im_colour32(i.hovered ? theme().text : theme().line), kRound * u, 0, std::max(1.0F, u));
+  focus_and_text({});
+  return i.pressed;
+}
+}  // namespace
+
+bool kit_colour(const char* id, std::array<float, 3>& rgb, float side) {
+  // Far from each other, and from bone.
+  static constexpr std::array<float, 3> kSwatches[] = {
+      {0.90F, 0.62F, 0},     {0.34F, 0.71F, 0.91F}, {0, 0.62F, 0.45F},     {0.94F, 0.89F, 0.26F},
+      {0, 0.45F, 0.70F},     {0.84F, 0.37F, 0},     {0.80F, 0.47F, 0.65F}, {0.55F, 0.55F, 1},
+      {0.80F, 0.12F, 0.15F}, {0.45F, 0.80F, 0.30F}, {0.60F, 0.40F, 0.25F}, {0.75F, 0.75F, 0.78F}};
+  constexpr int kInRow = 6;
+  const float u = unit();
+  ImGui::PushID(id);
+  if (swatch("colour", rgb, side)) ImGui::OpenPopup("colours");
+  bool changed = false;
+  ImGui::SetNextWindowSize({(kInRow * kRow + (kInRow - 1) * kGap + 24) * u, 0});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {12 * u, 12 * u});
+  const bool open = ImGui::BeginPopup("colours");
+  ImGui::PopStyleVar();
+  if (open) {
+    for (int n = 0; n < static_cast<int>(std::size(kSwatches)); ++n) {
+      if (n % kInRow != 0) ImGui::SameLine(0, kGap * u);
+      ImGui::PushID(n);
+      if (swatch("usual", kSwatches[n], kRow)) {
+        rgb = kSwatches[n];
+        changed = true;
+      }
+      ImGui::PopID();
+    }
+    const std::string names[] = {tr("Red"), tr("Green"), tr("Blue")};
+    for (std::size_t c = 0; c < 3; ++c) {
+      double at = std::round(255 * static_cast<double>(rgb[c]));
+      if (!kit_slider(names[c], shown_number(at, 0), at, 0, 255, 1)) continue;
+      rgb[c] = static_cast<float>(at / 255);
+      changed = true;
+    }
+    ImGui::EndPopup();
+  }
+  ImGui::PopID();
+  return changed;
+}
+
 int kit_list(const std::string& name, std::span<const std::string> words, int selected, const std::string& shown) {
   const float u = unit();
   ImGui::PushID(name.c_str());
   if (!name.empty()) ImGui::TextDisabled("%s", name.c_str());
   const float wide = ImGui::GetContentRegionAvail().x;
+  // ImGui's own field has one line: what needs more is written over it.
+  const std::string field = selected < 0 ? shown : words[static_cast<std::size_t>(selected)];
+  const float room = std::max(24 * u, wide - (kControl + 20) * u);
+  const Lines lines = lines_of(field, room, ImGui::GetFontSize());
+  const float high = std::max(kControl * u, lines.high + 12 * u);
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
   ImGui::SetNextItemWidth(wide);
-  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {12 * u, (kControl * u - ImGui::GetFontSize()) / 2});
-  const std::string field = shortened(selected < 0 ? shown : words[static_cast<std::size_t>(selected)],
-                                      wide - kControl * u - 16 * u, ImGui::GetFontSize());
+  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {12 * u, (high - ImGui::GetFontSize()) / 2});
   int chosen = -1;
-  const bool open = ImGui::BeginCombo("##list", field.c_str());
+  const bool open = ImGui::BeginCombo("##list", "");
   ImGui::PopStyleVar();
+  draw_lines(draw, {at.x + 12 * u, at.y + (high - lines.high) / 2}, room, lines.words, theme().text);
   if (!open) note_place(name.empty() ? field : name);
   if (open) {
     for (int n = 0; n < static_cast<int>(words.size()); ++n) {
@@ -400,6 +466,14 @@ bool list_row(const std::string& words, const std::string& right, bool selected,
   return i.pressed;
 }
 
+void kit_title(const std::string& words, float ems) {
+  ImGui::PushFont(bold_font());
+  ImGui::SetWindowFontScale(ems / kBoldEm);
+  kit_text(words, theme().text);
+  ImGui::SetWindowFontScale(1);
+  ImGui::PopFont();
+}
+
 void kit_heading(const std::string& words) {
   ImGui::Dummy({0, 4 * unit()});
   kit_text(words, theme().quiet);
@@ -436,11 +510,7 @@ int kit_dialog(const ScreenBox& window, const std::string& title, std::span<cons
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoNav);
   ImGui::PopStyleVar(2);
-  ImGui::PushFont(bold_font());
-  ImGui::SetWindowFontScale(1.25F / kBoldEm);
-  kit_text(title, theme().text);
-  ImGui::SetWindowFontScale(1);
-  ImGui::PopFont();
+  kit_title(title);
   for (const std::string& text : texts) {
     if (!text.empty()) kit_text(text, theme().text);
   }

@@ -69,6 +69,12 @@ enum class ButtonLook { usual, main, quiet };
 /// the focus Left and Right by `step`, with Shift by ten. `width`: pixels; 0: as there is room. True: `at` is another.
 [[nodiscard]] bool kit_slider(const std::string& name, const std::string& value, double& at, double least, double most,
                               double step, float width = 0);
+/// The same for what may be small or large: small values have as much of the track as large ones, by the cube root.
+[[nodiscard]] bool kit_root_slider(const std::string& name, const std::string& value, double& at, double least,
+                                   double most);
+/// A square of this colour (parts of 1); pressed, it opens some colours and a slider for red, green and blue. True: it
+/// is another.
+[[nodiscard]] bool kit_colour(const char* id, std::array<float, 3>& rgb, float side = kRow);
 /// Its name, where it has one, and below it a field that opens a list. The one that was chosen now, else -1. `shown`:
 /// in the field where none of `words` is selected.
 [[nodiscard]] int kit_list(const std::string& name, std::span<const std::string> words, int selected,
@@ -78,6 +84,8 @@ enum class ButtonLook { usual, main, quiet };
 [[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow,
                             std::string_view icon = {}, float width = 0);
 
+/// Above a card or a column, bold, so many em high.
+void kit_title(const std::string& words, float ems = 1.25F);
 /// Above what belongs together, in the labels' colour; and words in lines as there is room.
 void kit_heading(const std::string& words);
 void kit_text(const std::string& words, Colour colour);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <unordered_map>
 #include <vector>
 
 #include "osteo/core/base/translate.h"
@@ -19,20 +20,19 @@ constexpr ImWchar kAlways[] = {0x20,   0x17F,  0x2010, 0x205E, 0x2070, 0x209F, 0
                                0x2193, 0x2212, 0x2212, 0x2248, 0x2248, 0x2264, 0x2265, 0};
 constexpr unsigned kFirstChinese = 0x2E80;  // radicals; before come the scripts that Noto Sans has itself
 
-// Those and what texts need beyond them.
+// What texts need beyond them. A window that is open for days sees many names: of more letters than kKept those are
+// forgotten at the next making that were not drawn for so many pictures.
+constexpr std::size_t kKept = 1000;
+constexpr int kForgottenAfter = 600;
+
 struct Letters {
-  std::vector<bool> wanted = std::vector<bool>(IM_UNICODE_CODEPOINT_MAX + 1);
+  std::vector<bool> made = std::vector<bool>(IM_UNICODE_CODEPOINT_MAX + 1);  // what the atlas was asked for
+  std::unordered_map<unsigned, int> needed;                                  // the picture in which it was drawn last
   bool missing = false;
   Language language = Language::english;
 };
 Letters& letters() {
-  static Letters all = [] {
-    Letters l;
-    for (const ImWchar* range = kAlways; *range != 0; range += 2) {
-      for (unsigned c = range[0]; c <= range[1]; ++c) l.wanted[c] = true;
-    }
-    return l;
-  }();
+  static Letters all;
   return all;
 }
 
@@ -68,10 +68,10 @@ void need_letters(std::string_view text) {
 }
 
 void need_letter(char32_t letter) {
+  if (letter <= kAlways[1] || letter > IM_UNICODE_CODEPOINT_MAX) return;
   Letters& l = letters();
-  if (letter > IM_UNICODE_CODEPOINT_MAX || l.wanted[letter]) return;
-  l.wanted[letter] = true;
-  l.missing = true;
+  l.needed[letter] = ImGui::GetCurrentContext() != nullptr ? ImGui::GetFrameCount() : 0;
+  l.missing = l.missing || !l.made[letter];
 }
 
 bool letters_missing() {
@@ -85,11 +85,20 @@ void set_ui_style(int em_pixels) {
   const auto size = static_cast<float>(em_pixels);
   Letters& l = letters();
   l.language = language();
-  need_letters(catalogue_text(l.language));
   l.missing = false;
+  const int now = ImGui::GetFrameCount();
+  // Another context counts its own pictures.
+  if (l.needed.size() > kKept)
+    std::erase_if(l.needed, [&](const auto& n) { return n.second > now || n.second < now - kForgottenAfter; });
+  l.made.assign(l.made.size(), false);
+  for (const ImWchar* range = kAlways; *range != 0; range += 2) {
+    for (unsigned c = range[0]; c <= range[1]; ++c) l.made[c] = true;
+  }
+  each_letter(catalogue_text(l.language), [&](unsigned c) { l.made[c] = true; });
+  for (const auto& [c, picture] : l.needed) l.made[c] = true;
   // They live until the atlas is made.
-  const ImVector<ImWchar> western = ranges_of(l.wanted, 0x20, kFirstChinese),
-                          chinese = ranges_of(l.wanted, kFirstChinese, IM_UNICODE_CODEPOINT_MAX + 1);
+  const ImVector<ImWchar> western = ranges_of(l.made, 0x20, kFirstChinese),
+                          chinese = ranges_of(l.made, kFirstChinese, IM_UNICODE_CODEPOINT_MAX + 1);
   ImFontConfig config;
   config.FontDataOwnedByAtlas = false;
   // Large letters are sharp without, and their atlas is half as large.

@@ -13,7 +13,8 @@ namespace osteo::inline app {
 
 /// Puts Noto Sans into the context's atlas, an em of it so high, in place of what is there, and sets sizes and colours
 /// that go with it. It is part of the program, no file is looked for. The atlas has Western Europe's letters, those of
-/// the language, and what need_letters() was told of. Its texture has to be made again by whoever owns one.
+/// the language, and what need_letters() was told of; of many letters those that were not drawn for long are forgotten.
+/// Its texture has to be made again by whoever owns one.
 void set_ui_style(int em_pixels);
 /// What cases and people bring along, names and notes: their letters are in the atlas from its next making on. Latin,
 /// Greek, Cyrillic, and of Chinese, Japanese and Korean what the fonts have (libs/app/window/fonts). Cheap where all of

@@ -37,6 +37,17 @@ void stack_over(ViewLayout& layout, float wished, std::size_t count) {
                       side, side};
 }
 
+// In that corner too; where the burr's card has it alone, above the scale bar.
+void place_tile(ViewLayout& layout) {
+  layout.cut_tile = {};
+  const float u = layout.unit, side = std::round(kChoice * u), inset = std::round(kInset * u);
+  if (layout.shown != Layout::operate || !layout.over[0].empty() || layout.view.height < side + 2 * inset) return;
+  const bool above = layout.view.width >= (kBesideCut + kChoice) * u;
+  layout.cut_tile = {layout.view.right() - inset - side,
+                     above ? layout.view.y + inset : layout.view.bottom() - std::round(kScaleHigh * u) - side, side,
+                     side};
+}
+
 }  // namespace
 
 Layout next_layout(Layout layout) {
@@ -87,6 +98,7 @@ ViewLayout lay_out(Layout wanted, int width, int height, float em, float cut_sid
   const float most = std::sqrt(std::max(0.0F, spare) / static_cast<float>(count)), grid = kGrid * u;
   const float usual = std::clamp(std::floor(most / grid) * grid, kMinCut * u, kMaxCut * u);
   stack_over(out, cut_side > 0 ? std::max(cut_side, kMinCut * u) : usual, count);
+  place_tile(out);
   return out;
 }
 
@@ -109,6 +121,7 @@ ScreenBox take_strip(ViewLayout& layout, float high) {
     const auto shown =
         std::count_if(layout.over.begin(), layout.over.end(), [](const ScreenBox& b) { return !b.empty(); });
     if (shown > 0) stack_over(layout, layout.over[0].width, static_cast<std::size_t>(shown));
+    place_tile(layout);
   }
   return {left, bottom - high, right - left, high};
 }
@@ -131,8 +144,9 @@ ScreenBox take_column(ViewLayout& layout, float wide) {
     layout.view.width -= wide;
     // One cut beside a column: the bone has the picture.
     if (!layout.over[0].empty()) stack_over(layout, layout.over[0].width, 1);
-    // Nor that one, where the burr's card has no room beside it: it is a key away.
+    // Nor that one, where the burr's card has no room beside it: it is a tile away.
     if (layout.over[0].x - left < kBesideCut * layout.unit) layout.over = {};
+    place_tile(layout);
   }
   return {right - wide, layout.view.y, wide, bottom - layout.view.y};
 }

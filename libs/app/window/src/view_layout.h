@@ -37,10 +37,14 @@ struct ViewLayout {
   bool two_rows = false;           ///< of the state: the nearest structure is below the figures
   std::array<ScreenBox, 3> cuts;   ///< four up; empty in other layouts
   std::array<ScreenBox, 3> over;   ///< cuts that lie on the picture; those without room are empty
+  ScreenBox cut_tile;              ///< where operate has no room for a cut: what brings one over the picture; else empty
   ScreenBox page;                  ///< of the end, in review; else empty
   float unit = 1;                  ///< pixels for one of the design's
-  /// From the view's left edge as far as cuts lie on it; all of it where none do.
-  [[nodiscard]] float free_width() const { return over[0].empty() ? view.width : over[0].x - view.x; }
+  /// From the view's left edge as far as cuts, or the tile in their place, lie on it; all of it where none do.
+  [[nodiscard]] float free_width() const {
+    const ScreenBox& first = over[0].empty() ? cut_tile : over[0];
+    return first.empty() ? view.width : first.x - view.x;
+  }
   /// Of the window: what cuts on it leave to the picture.
   [[nodiscard]] double picture_share(int width, int height) const;
 };

@@ -65,12 +65,16 @@ void draw_nearest(ImDrawList* draw, const ScreenBox& near, const StateFacts& f, 
 
 // At the foot of the picture, beside the scale bar's box; in lines where one is too short.
 void draw_message(const ScreenBox& view, const std::string& words, const ChipLook& look) {
-  const float u = unit(), most = view.width - (view.width > kNarrow * u ? 352 : 160) * u;
+  const float u = unit();
+  constexpr float kScaleBar = 72;
+  // In a low or narrow picture not beside the scale bar: in few lines, in front of it or above it.
+  const bool low = view.height < 200 * u, narrow = view.width < 400 * u;
+  const float most = view.width - (low || narrow ? 32 : view.width > kNarrow * u ? 352 : 160) * u;
   if (most < 64 * u) return;
   const float wide = std::min(chip_width(words), most), high = chip_height(words, wide);
-  // In a very low picture it is in front of what it has no room beside.
-  ImDrawList* const draw = view.height < 200 * u ? ImGui::GetForegroundDrawList() : ImGui::GetBackgroundDrawList();
-  draw_chip(draw, {view.x + 16 * u, view.bottom() - 8 * u - high, wide, high}, words, look);
+  const float below = narrow && !low ? kScaleBar * u : 8 * u;
+  ImDrawList* const draw = low || narrow ? ImGui::GetForegroundDrawList() : ImGui::GetBackgroundDrawList();
+  draw_chip(draw, {view.x + 16 * u, view.bottom() - below - high, wide, high}, words, look);
 }
 
 }  // namespace
@@ -157,7 +161,7 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& 
     const char* why = "";
   };
   const bool drill = hand.tool == 0 && !hand.saw;
-  const char* const no_second = tr("no second hand: start with --dust");
+  const char* const no_second = tr("there is no second hand in this session");
   const Row rows[] = {{"menu-2", tr("Menu and settings"), Command::settings, false, menu},
                       {"drill", tr("Drill"), Command::put_away, drill, hand.latched, true, true},
                       {"saw", tr("Saw"), Command::saw, hand.tool == 1 || hand.saw},
@@ -386,11 +390,7 @@ ScreenBox draw_tool_card(const ScreenBox& view, float free_width, const char* na
                    ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoBringToFrontOnFocus);
   ImGui::PopStyleColor();
   ImGui::PopStyleVar();
-  ImGui::PushFont(bold_font());
-  ImGui::SetWindowFontScale(1 / kBoldEm);
-  ImGui::TextUnformatted(title.c_str());
-  ImGui::SetWindowFontScale(1);
-  ImGui::PopFont();
+  kit_title(title, 1);
   content();
   const ImVec2 at = ImGui::GetWindowPos(), size = ImGui::GetWindowSize();
   ImGui::End();
@@ -417,6 +417,16 @@ CutsFoot draw_cuts_foot(const ScreenBox& box, bool alone, int chosen, bool setti
   pressed.settings = tile("settings", "settings", {false, settings_open, true, help}, side);
   ImGui::End();
   return pressed;
+}
+
+void draw_cut_tile(const ScreenBox& box, bool shown, Pressed& pressed) {
+  if (box.empty()) return;
+  begin_card("cut", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing);
+  const std::string words = filled(shown ? tr("the cut goes away ({key})") : tr("a cut over the picture ({key})"),
+                                   {{"key", key_name(Command::cut_in_middle)}});
+  if (tile("cut", shown ? "x" : "layout-grid", {false, shown, true, words}, box.width))
+    pressed.press(Command::cut_in_middle);
+  ImGui::End();
 }
 
 void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const LocalText&)>& say) {

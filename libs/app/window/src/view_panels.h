@@ -60,6 +60,8 @@ struct CutsFoot {
   bool settings = false;
 };
 CutsFoot draw_cuts_foot(const ScreenBox& box, bool alone, int chosen, bool settings_open, const std::string& help);
+/// Where the picture has no room for cuts: a click brings one over it, and away again (`shown`).
+void draw_cut_tile(const ScreenBox& box, bool shown, Pressed& pressed);
 /// Into a card: what the second hand holds, and the size of its suction tube.
 void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const LocalText&)>& say);
 /// Into the current window: what ends or begins a session.

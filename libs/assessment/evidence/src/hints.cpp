@@ -83,6 +83,8 @@ HintWatch::HintWatch(std::vector<HintRule> rules, double rate_hz, const Structur
 
 void HintWatch::action(const SceneAction& action) {
   if (action.is(ActionKind::irrigate)) water_flows_ = action.values[4] > 0;
+  if (action.is(ActionKind::simulate) && action.item == static_cast<std::uint32_t>(Simulated::dust))
+    water_ = action.values[0] > 0;
 }
 
 bool HintWatch::holds(const HintRule& rule, const TickRecord& t) const {

@@ -68,7 +68,7 @@ class MovieReader final : public Reader {
         fixed_(fixed),
         structures_(structures),
         hands_(hands),
-        scene_({true, false, dust}, survey.rate_hz, {}),
+        scene_({.dust = dust, .dust_by_action = true}, survey.rate_hz, {}),
         stage_(options.width, options.height, structures, options.deep),
         file_(file),
         context_(context) {}

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace osteo::inline display {
@@ -19,7 +20,8 @@ std::uint64_t WetFilm::key(int bi, int bj, int bk) {
 
 bool WetFilm::update(const Dust& dust) {
   bone_ = &dust.bone();
-  std::unordered_map<std::uint64_t, std::unique_ptr<Cells>> now;
+  frame_ = bone_->frame();
+  Bricks now;
   Cells* cells = nullptr;
   std::uint64_t last = 0;
   dust.visit_liquid([&](Ijk c, double full, double) {
@@ -35,6 +37,10 @@ bool WetFilm::update(const Dust& dust) {
     }
     (*cells)[BrickGrid::offset_in_brick(c.i, c.j, c.k)] = wet;
   });
+  return take(std::move(now));
+}
+
+bool WetFilm::take(Bricks now) {
   std::vector<std::uint64_t> differ;
   for (const auto& [name, is] : now) {
     const auto was = bricks_.find(name);
@@ -77,7 +83,7 @@ double WetFilm::at(Vec3 world_mm) const {
 
 bool WetFilm::changed_near(Vec3 world_mm) const {
   if (changed_.empty()) return false;
-  const Vec3 x = bone_->frame().index_from_world(world_mm);
+  const Vec3 x = frame_.index_from_world(world_mm);
   const auto brick = [](double v) { return static_cast<int>(std::floor(v + 0.5)) >> 3; };
   return changed_.contains(key(brick(x.x), brick(x.y), brick(x.z)));
 }

@@ -80,13 +80,16 @@ void WorldView::update(const World& world, SceneReaders& readers, Work work) {
     if (work == Work::all || now - changed_at_ > kStill) view->refresh(*surface);
     view->place(placed.world_from_body);
     if (film_changed) view->wet(*surface);
-    if (heat_changed) view->warm(*surface, warm_places_, [&](Vec3 at) { return readers.heat->celsius_at(at); });
+    if (heat_changed)
+      view->warm(*surface, warm_places_, [&](Vec3 at) { return readers.heat ? readers.heat->celsius_at(at) : 0; });
   }
   if (regions && others) shade_regions(world, readers);
   plates_.update(world);
   if (readers.dust) {
     if (!dust_) dust_ = std::make_unique<DustView>(renderer_, world.bodies().front().body->bone.frame().spacing_mm.x);
     dust_->update(readers.dust->dust());
+  } else {
+    dust_.reset();
   }
 }
 
@@ -111,18 +114,28 @@ void WorldView::shade_regions(const World& world, const SceneReaders& readers) {
 // Ten times a second at most: water runs, and its looks change slowly.
 bool WorldView::look_at_film(const SceneReaders& readers, std::chrono::steady_clock::time_point now) {
   constexpr std::chrono::milliseconds kEvery{100};
-  if (!readers.dust || now < film_at_ || readers.dust->dust().version() == film_of_) return false;
+  if (!readers.dust) {
+    film_of_.reset();
+    return film_.clear();
+  }
+  // What was switched off and on is another, and the film looks into the bone that it lies on.
+  const Dust& dust = readers.dust->dust();
+  const bool other = film_dust_ != &dust || !film_of_ || dust.version() < *film_of_;
+  if (!other && (now < film_at_ || dust.version() == *film_of_)) return false;
   film_at_ = now + kEvery;
-  film_of_ = readers.dust->dust().version();
-  return film_.update(readers.dust->dust());
+  film_dust_ = &dust;
+  film_of_ = dust.version();
+  return film_.update(dust);
 }
 
 // Five times a second: heat spreads slowly.
 bool WorldView::look_at_heat(const SceneReaders& readers, std::chrono::steady_clock::time_point now) {
   constexpr std::chrono::milliseconds kEvery{200};
-  if (!readers.heat || now < heat_at_) return false;
-  heat_at_ = now + kEvery;
   const bool was_warm = !warm_places_.empty();
+  if (!readers.heat) warm_places_.clear();
+  if (!readers.heat) return was_warm;
+  if (now < heat_at_) return false;
+  heat_at_ = now + kEvery;
   warm_places_.clear();
   readers.heat->for_warm_places(
       [&](Vec3 centre_mm, double radius_mm) { warm_places_.emplace_back(centre_mm, radius_mm); });

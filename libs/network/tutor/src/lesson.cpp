@@ -12,7 +12,7 @@ namespace {
 
 bool plays_on(const SceneAction& a) {
   const ActionRow& row = row_of(a);
-  return row.by_servo || row.moves_dust || a.is(ActionKind::hold) || a.is(ActionKind::resume);
+  return row.by_servo || row.moves_dust || row.begins_state || a.is(ActionKind::hold) || a.is(ActionKind::resume);
 }
 
 }  // namespace
@@ -61,7 +61,8 @@ Lesson read_lesson(const SessionReader& session, double from_s, double to_s) {
       if (a.tick >= end) continue;
       if (a.is(ActionKind::setting) && a.tick <= lesson.first_tick) {
         change_setting(lesson.setup.params, a.item, a.values[0]);
-      } else if (a.is(ActionKind::setting) || (a.tick >= lesson.first_tick && row_of(a).moves_dust)) {
+      } else if (a.is(ActionKind::setting) ||
+                 (a.tick >= lesson.first_tick && (row_of(a).moves_dust || row_of(a).begins_state))) {
         lesson.actions.push_back(a);
         lesson.actions.back().tick -= lesson.first_tick;
       } else if (a.is(ActionKind::grip) || a.is(ActionKind::guide) || a.is(ActionKind::cutting_guide) ||

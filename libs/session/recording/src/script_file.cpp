@@ -309,6 +309,12 @@ class ScriptReader {
     add(t, SceneAction::plain(ActionKind::undo));
   }
 
+  void act(double t, const Simulate& s, const JsonValue& j, const std::string& where) {
+    if (j.members.empty()) throw file_.wrong(j, where + ": it names neither \"dust\" nor \"heat\"");
+    if (j.find("dust") != nullptr) add(t, SceneAction::simulate(Simulated::dust, s.dust));
+    if (j.find("heat") != nullptr) add(t, SceneAction::simulate(Simulated::heat, s.heat));
+  }
+
   // Each is an action of its own, in the order of the settings; as they are in the file, so that what is said of none
   // is left alone.
   void act(double t, const Set& s, const JsonValue& j, const std::string& where) {

@@ -227,6 +227,15 @@ struct Undo {
   static void describe(Undo&, auto&) {}
 };
 
+struct Simulate {
+  static constexpr const char *kName = "simulate", *kHelp = "what begins here with the bone as it is, or ends";
+  bool dust = false, heat = false;
+  static void describe(Simulate& p, auto& visit) {
+    visit({"dust", "bone dust and water"}, p.dust);
+    visit({"heat", "how warm drilling makes bone"}, p.heat);
+  }
+};
+
 // Its keys are the names of the haptic settings, which are declared where they belong.
 struct Set {
   static constexpr const char *kName = "set", *kHelp = "haptic settings that have other values from here on";
@@ -234,7 +243,7 @@ struct Set {
   static void describe(Set& p, auto& visit) { HapticsParams::describe(p.params, visit); }
 };
 
-using Forms =
-    std::tuple<Saw, GuidePart, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Patient, Undo, Set>;
+using Forms = std::tuple<Saw, GuidePart, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Patient, Undo,
+                         Simulate, Set>;
 
 }  // namespace osteo::inline session::script

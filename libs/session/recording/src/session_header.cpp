@@ -267,7 +267,7 @@ std::string header_json(const SessionHeader& h) {
   j["rate_hz"] = h.rate_hz;
   j["hands"] = h.haptics.hands();
   j["dust"] = h.dust;
-  if (h.dust) j["dust_model"] = h.dust_model;
+  j["dust_model"] = h.dust_model;  // dust may begin later
   // Where an older session goes on under its own settings, it is reported by them.
   const int law = h.haptics.params.guard.law, contact = law == GuardParams{}.law ? h.kernels.contact : law + 1;
   j["kernels"] = {{"burrs", h.kernels.burrs}, {"contact", contact}, {"scene", h.kernels.scene}};

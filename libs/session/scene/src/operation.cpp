@@ -61,6 +61,8 @@ World::Effect Operation::act(const SceneAction& action, const Done& done, const 
     auto beside = std::async(row.reads_bone && done ? std::launch::async : std::launch::deferred, scene_of);
     if (row.changes_world && done) done(effect);
     scene = beside.get();
+  } else if (row.begins_state && done) {
+    done(effect);
   }
   hand_over(action, std::move(scene));
   return effect;

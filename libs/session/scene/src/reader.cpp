@@ -90,6 +90,10 @@ void ReaderDispatcher::scene_changed(const World::Effect& effect) {
   for (Reader* const r : readers_) r->scene_changed(world_, effect);
 }
 
+void ReaderDispatcher::begins(const SceneAction& action) {
+  for (Reader* const r : readers_) r->begins(world_, action);
+}
+
 void ReaderDispatcher::end(std::uint64_t ticks) {
   take_actions();
   for (; !actions_.empty(); actions_.pop_front()) notify(actions_.front());

@@ -26,6 +26,17 @@ std::vector<Device*> pointers(const std::vector<std::unique_ptr<Device>>& device
   return all;
 }
 
+// Dust and heat begin and end with actions; at first they are as asked.
+World as_begun(World world, const ReaderList& follow) {
+  world.simulate(Simulated::dust, follow.dust);
+  world.simulate(Simulated::heat, follow.heat);
+  return world;
+}
+ReaderList by_action(ReaderList follow) {
+  follow.dust_by_action = follow.heat_by_action = true;
+  return follow;
+}
+
 constexpr const char* kUndoLost =
     "undo history lost: the machine did not keep up, and what was done before that cannot be undone";
 
@@ -48,7 +59,8 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
       voxel_mm3_(world.bodies().front().body->bone.frame().voxel_volume_mm3()),
       finest_voxel_mm_(world.finest_voxel_mm()),
       bone_mm3_(bone_mm3_of(world)),
-      operation_(std::move(world), options.haptics, options.anatomy, pointers(devices_), stream_, options.rate_hz),
+      operation_(as_begun(std::move(world), options.follow), options.haptics, options.anatomy, pointers(devices_),
+                 stream_, options.rate_hz),
       dispatcher_(stream_.add_reader(), operation_.world()),
       keeper_end_(stream_.add_reader(Recorder::kTickCapacity)),
       keeper_(keeper_end_, operation_.world()),
@@ -63,8 +75,8 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);
   }
   keeper_.add(operation_.strokes(), false);
-  readers_ =
-      std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context, structures());
+  readers_ = std::make_unique<SceneReaders>(operation_.world(), by_action(options_.follow), options_.rate_hz, context,
+                                            structures());
   readers_->add_to(dispatcher_, &keeper_);
   pieces_ = static_cast<int>(readers_->large_pieces().size());
   if (structures() != nullptr) {
@@ -155,6 +167,11 @@ void Rehearsal::drain_keeper() {
   strokes_lost_ = true;
 }
 
+bool Rehearsal::simulates(Simulated what) {
+  const std::lock_guard lock(mutex_);
+  return what == Simulated::dust ? readers_->dust != nullptr : readers_->heat != nullptr;
+}
+
 void Rehearsal::add_counter(Reader& reader) {
   const std::lock_guard lock(keeper_mutex_);
   keeper_.add(reader, false);
@@ -184,6 +201,7 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
     return readers_->pieces ? readers_->pieces->components(body) : nullptr;
   };
   const Operation::Done done = [&](const World::Effect& e) {
+    if (row_of(action).begins_state) return dispatcher_.begins(action);
     dispatcher_.scene_changed(e);
     const std::lock_guard lock(keeper_mutex_);
     keeper_.scene_changed(e);

@@ -61,7 +61,7 @@ class Replaying {
         operation_(std::move(start), session.header().haptics, anatomy, devices(), stream_, session.header().rate_hz),
         dispatcher_(stream_.add_reader(), operation_.world()),
         // Dust follows from the stream, so it has to come out the same as well.
-        readers_(operation_.world(), {false, false, session.header().dust}, session.header().rate_hz, context) {
+        readers_(operation_.world(), {.surface = false, .dust_by_action = true}, session.header().rate_hz, context) {
     dispatcher_.add(operation_.strokes(), false);
     readers_.add_to(dispatcher_);
     for (Reader* const r : readers) dispatcher_.add(*r);
@@ -94,7 +94,8 @@ class Replaying {
     if (repeating_ && from_changes_.hash() != operation_.world().hash()) differ_in_bone();
     result_.structures = operation_.renderer().structure_events();
     result_.losses = losses(o);
-    if (o.header.dust && o.header.dust_model != kDustModel)
+    const bool dust = o.end && !o.end->dust_hash.empty();
+    if ((o.header.dust || dust) && o.header.dust_model != kDustModel)
       result_.losses.push_back("dust of model " + std::to_string(o.header.dust_model) + ", which this version (model " +
                                std::to_string(kDustModel) + ") does not have: where it lay at the end is not compared");
     result_.bone_hash = from_changes_.hash();
@@ -149,7 +150,10 @@ class Replaying {
       return;
     }
     dispatcher_.drain();
-    const World::Effect effect = operation_.act(action, [&](const World::Effect& e) { dispatcher_.scene_changed(e); });
+    const World::Effect effect = operation_.act(action, [&](const World::Effect& e) {
+      if (row_of(action).begins_state) return dispatcher_.begins(action);
+      dispatcher_.scene_changed(e);
+    });
     if (!effect.done)
       differ("at tick " + std::to_string(action.tick) + " '" + std::string(name_of(action)) +
              "' could not be done: " + effect.message);
@@ -259,6 +263,7 @@ ReplayResult replay(const SessionReader& session, World start, const Anatomy& an
                     std::span<Reader* const> readers) {
   const auto begin = std::chrono::steady_clock::now();
   check_same_case(session, start, anatomy);
+  start.simulate(Simulated::dust, session.header().dust);
   Replaying again(session, std::move(start), anatomy, context, readers);
   auto parts = session.parts();
   while (const SessionPart* const part = parts.next()) again.take(*part);

@@ -70,6 +70,10 @@ std::vector<std::string> warnings_about(const Script& script, const World& world
                        format_number(std::round(box.hi.y)) + ", " + format_number(std::round(box.hi.z)));
   }
   const auto cleans = [](const Script::TimedAction& d) { return row_of(d.action).moves_dust; };
+  const auto begins = [](const Script::TimedAction& d) {
+    return d.action.is(ActionKind::simulate) && d.action.item == static_cast<std::uint32_t>(Simulated::dust);
+  };
+  dust = dust || std::any_of(script.actions.begin(), script.actions.end(), begins);
   if (!dust && std::any_of(script.actions.begin(), script.actions.end(), cleans))
     warnings.emplace_back(
         "the script sucks off dust, pours water or turns the patient, but there is no dust: add --dust");

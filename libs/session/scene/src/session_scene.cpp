@@ -13,7 +13,8 @@ void SessionScene::resync(const World& world) {
   world_.emplace(world.copy());
   removed_mm3_ = 0;
   in_use_ = {};
-  if (!again || follow_.dust) {  // dust begins again
+  if (!again) world_->simulate(Simulated::dust, world_->simulates(Simulated::dust) || follow_.dust);
+  if (!again || follow_.dust || follow_.dust_by_action) {  // dust begins again
     readers_ = std::make_unique<SceneReaders>(*world_, follow_, rate_hz_, context_);
     return;
   }
@@ -28,10 +29,11 @@ void SessionScene::action(const SceneAction& action) {
   if (!row_of(action).by_servo && effect.done && row_of(action).changes_world) {
     if (readers_->surface) readers_->surface->scene_changed(*world_, effect);
     if (readers_->pieces) readers_->pieces->scene_changed(*world_, effect);
-    if (readers_->dust) readers_->dust->scene_changed(*world_, effect);
+    readers_->simulation().scene_changed(*world_, effect);
   }
+  if (row_of(action).begins_state && effect.done) readers_->simulation().begins(*world_, action);
   if (readers_->pieces) readers_->pieces->action(action);
-  if (readers_->dust) readers_->dust->action(action);
+  readers_->simulation().action(action);
 }
 
 void SessionScene::set(std::span<const VoxelChange> changes) {
@@ -53,7 +55,7 @@ void SessionScene::tick(const TickRecord& record, std::span<const VoxelChange> c
   }
   if (readers_->surface) readers_->surface->tick({}, reported);
   if (readers_->pieces) readers_->pieces->tick(record, reported);
-  if (readers_->dust) readers_->dust->tick(record, reported);
+  readers_->simulation().tick(record, reported);
   readers_->tools.tick(record, reported);
   if (record.hand < latest_.size()) {
     latest_[record.hand] = record;

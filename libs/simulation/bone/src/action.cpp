@@ -35,6 +35,7 @@ constexpr ActionValue kPosture[] = {{"down_x", "1"}, {"down_y", "1"}, {"down_z",
 constexpr ActionValue kSoftPush[] = {{"at_x", "mm"},    {"at_y", "mm"},    {"at_z", "mm"}, {"normal_x", "1"},
                                      {"normal_y", "1"}, {"normal_z", "1"}, {"force", "N"}, {"stiffness", "N/mm"}};
 constexpr ActionValue kSetting[] = {{"value", "as the setting's"}};
+constexpr ActionValue kSimulate[] = {{"on", "1"}};
 
 constexpr ActionValue kGuide[] = {{"hand", "1"}, {"stiffness", "N/mm"}, {"damping", "N s/m"}, {"forward", "1"},
                                   {"most", "N"}, {"dead_zone", "mm"},   {"own_contact", "1"}, {"brake", "N s/m"}};
@@ -167,6 +168,14 @@ constexpr std::array<ActionRow, kLast> kTable{{
      .last_counts = true,
      .hand = "whose saw",
      .values = kCuttingGuide},
+    {.kind = ActionKind::simulate,
+     .name = "simulate",
+     .help = "dust and water, or heat, begin here with the bone as it is (1), or end and are gone (0)",
+     .reads_bone = true,
+     .ends_hold = true,
+     .begins_state = true,
+     .item = "what: 0 dust and water, 1 heat",
+     .values = kSimulate},
 }};
 
 // A kind without its row, or out of order, does not compile.
@@ -280,6 +289,13 @@ SceneAction SceneAction::setting(std::uint32_t number, double value) {
   SceneAction a = plain(ActionKind::setting);
   a.item = number;
   a.values[0] = value;
+  return a;
+}
+
+SceneAction SceneAction::simulate(Simulated what, bool on) {
+  SceneAction a = plain(ActionKind::simulate);
+  a.item = static_cast<std::uint32_t>(what);
+  a.values[0] = on ? 1 : 0;
   return a;
 }
 

@@ -67,6 +67,10 @@ std::string senseless(const SceneAction& a) {
         return "it reaches " + format_number(v[3]) + " mm, but at most " + format_number(SceneAction::kMaxReachMm) +
                " mm make sense";
       break;
+    case ActionKind::simulate:
+      if (a.item >= static_cast<std::uint32_t>(Simulated::behind_last) || (v[0] != 0 && v[0] != 1))
+        return "dust (0) or heat (1) begins (1) or ends (0)";
+      break;
     case ActionKind::posture:
       if (const double n = length(Vec3{v[0], v[1], v[2]}); !(n > 0.99 && n < 1.01))
         return "what is down must be a unit direction";
@@ -304,6 +308,9 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       break;
     case ActionKind::cutting_guide:
       guides_[a.hand] = a.guide();
+      break;
+    case ActionKind::simulate:
+      simulate(static_cast<Simulated>(a.item), a.values[0] > 0);
       break;
     case ActionKind::saw:
       return saw(a);

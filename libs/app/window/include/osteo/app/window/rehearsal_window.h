@@ -136,12 +136,14 @@ struct WindowActions {
   std::function<SessionReview(const Context&)> review = {};
   /// From now on the rehearsal has a nerve monitor, or none. False: it has to stay as it is. Empty: it always has.
   std::function<bool(bool)> turn_monitor = {};
+  /// From now on dust and water, or heat, are simulated in the session, or not. Empty: they are as another has them.
+  std::function<void(Simulated, bool)> simulate = {};
   /// The nerve monitor of the rehearsal that runs; null: it has none. Empty: there never is one.
   std::function<MonitorController*()> monitor = {};
   /// Who leads the hand, and who takes part from elsewhere. Empty: nobody ever does.
   std::function<TutorNow()> tutor = {};
-  /// Each frame of a session with a tutor: how far the procedure is. `injured`: structures that a rotating burr or a saw
-  /// has reached. Empty: it is not judged here.
+  /// Each frame of a session with a tutor: how far the procedure is. `injured`: structures that a rotating burr or a
+  /// saw has reached. Empty: it is not judged here.
   std::function<std::vector<TutorNow::Step>(const std::vector<std::string>& injured)> steps = {};
   /// The hand is to be led, or let go; softly. Empty: nobody leads it.
   std::function<void(bool)> lead = {};

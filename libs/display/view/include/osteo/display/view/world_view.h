@@ -6,6 +6,7 @@
 #include <future>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "osteo/core/data/data.h"
@@ -81,7 +82,8 @@ class WorldView {
   std::atomic<bool> stop_ = false;
   std::chrono::steady_clock::time_point settle_at_, changed_at_;
   std::chrono::steady_clock::time_point film_at_{};  // when it is looked at again
-  std::uint64_t film_of_ = 0;                        // version of the dust
+  const Dust* film_dust_ = nullptr;
+  std::optional<std::uint64_t> film_of_;  // version of the dust
   std::vector<std::pair<Vec3, double>> warm_places_;
   std::chrono::steady_clock::time_point heat_at_{};  // when it is looked at again
   bool looked_ = false;

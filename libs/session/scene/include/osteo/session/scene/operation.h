@@ -39,8 +39,8 @@ class Operation {
   /// The servo has taken up all that was done.
   [[nodiscard]] bool taken() const noexcept { return servo_.taken(); }
 
-  /// Called when the world was changed (ActionRow::changes_world) and the servo does not know it yet: bodies that are
-  /// new are still as they were made.
+  /// Called when the world was changed (ActionRow::changes_world), or a state begins (ActionRow::begins_state), and the
+  /// servo does not know it yet: bodies that are new are still as they were made.
   using Done = std::function<void(const World::Effect&)>;
   /// In the thread that also steps; at most one action a tick. Who drains strokes() does so before.
   World::Effect act(const SceneAction& action, const Done& done = {}, const World::ComponentsOf& components = {});

@@ -28,6 +28,12 @@ class Reader {
     static_cast<void>(world);
     static_cast<void>(effect);
   }
+  /// A state of its own begins or ends with this action (ActionRow::begins_state), of which the stream tells later:
+  /// `world` is as it will be then.
+  virtual void begins(const World& world, const SceneAction& action) {
+    static_cast<void>(world);
+    static_cast<void>(action);
+  }
   /// At the beginning of its tick: after all ticks before it, before what changes in it. scene_changed() calls come in
   /// the same order.
   virtual void action(const SceneAction& action) { static_cast<void>(action); }
@@ -58,6 +64,8 @@ class ReaderDispatcher {
   std::size_t drain(std::optional<double> about_ms = {});
   /// The world was changed by an action that the stream will tell of; drained as far as it went before.
   void scene_changed(const World::Effect& effect);
+  /// A state begins or ends with it (Reader::begins); drained before, and nothing is removed until its tick.
+  void begins(const SceneAction& action);
   /// The servo has ended after so many ticks, and drain() took what there was: actions behind the last tick are told,
   /// and if the last ticks are missing that counts as lost.
   void end(std::uint64_t ticks);

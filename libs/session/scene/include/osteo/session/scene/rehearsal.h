@@ -30,7 +30,7 @@ struct RehearsalOptions {
   HapticSetup haptics;
   Anatomy anatomy;  ///< hardness where haptics.hardness is set; critical structures where the case has them
   std::filesystem::path session_file;  ///< empty: not recorded
-  ReaderList follow;                   ///< what is kept up beside the servo
+  ReaderList follow;                   ///< what is kept up beside the servo; dust and heat: at the beginning
   std::vector<SceneAction> actions;    ///< done when their tick has come, in order
   std::shared_ptr<SoftTissue> soft;    ///< soft tissue that the hands' tools meet; null: none
   std::function<void(const std::string& kind, const std::string& json)>
@@ -155,6 +155,9 @@ class Rehearsal {
   }
   /// The settings as the last action has left them.
   [[nodiscard]] HapticsParams settings() const;
+  /// Whether dust and water, or heat, are there now: what was asked for by an action comes a few ticks later. Waits for
+  /// the lock of look().
+  [[nodiscard]] bool simulates(Simulated what);
   /// Null where the scene has none; under look() only.
   [[nodiscard]] SoftTissue* soft() const { return options_.soft.get(); }
   /// Its bodies as they were last, from any thread.

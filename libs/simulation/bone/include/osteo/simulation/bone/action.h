@@ -33,8 +33,12 @@ enum class ActionKind : std::uint32_t {
   posture,        ///< the patient lies otherwise: what is down for dust and water
   guide,          ///< one hand is led by another from here on, or let go
   cutting_guide,  ///< a slot that holds a hand's saw in a plane, or none
+  simulate,       ///< dust and water, or heat, begin with the bone as it is, or end
   behind_last
 };
+
+/// What is computed beside bone and force, and may begin or end at any tick. Numbers are those of session files.
+enum class Simulated : std::uint32_t { dust, heat, behind_last };
 
 /// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and
 /// the scene alone.
@@ -51,7 +55,7 @@ struct SceneAction {
   std::uint32_t kind = 0;         ///< ActionKind
   std::uint32_t body = kNobody;   ///< id of a piece; what for, and what the rest means: ActionRow
   std::uint32_t other = kNobody;  ///< id of a second piece
-  std::uint32_t item = 0;         ///< index in plate_library(), id of a fixture, number of a setting
+  std::uint32_t item = 0;         ///< index in plate_library(), id of a fixture, number of a setting, Simulated
   std::uint32_t hand = 0;         ///< whose tool or plate is meant
   std::uint32_t unused = 0;       ///< always 0
   std::array<double, 12> values{};
@@ -73,6 +77,7 @@ struct SceneAction {
   /// deeper.
   static SceneAction soft_push(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm);
   static SceneAction setting(std::uint32_t number, double value);
+  static SceneAction simulate(Simulated what, bool on);
   /// Its normal need not be unit; of the slot's height only what lies in the plane counts.
   static SceneAction cutting_guide(const CuttingGuide& guide, std::uint32_t hand = 0);
   [[nodiscard]] SawCut saw_cut() const;
@@ -103,8 +108,10 @@ struct ActionRow {
   bool ends_hold = false;   ///< after it, done or not, bone may be removed again
   bool by_servo =
       false;  ///< the servo tells of it by itself: nobody asks for it, and a replay does not do it but gets it again
-  bool made_often = false;  ///< follows from what else is done, many times a second: not reported when it fails, and
-                            ///< not kept for later
+  bool made_often = false;    ///< follows from what else is done, many times a second: not reported when it fails, and
+                              ///< not kept for later
+  bool begins_state = false;  ///< a state of its own begins with the scene as it is then, and follows from the stream
+                              ///< from there on: readers are given that scene (Reader::begins)
   std::string_view body = {}, other = {}, item = {}, hand = {};  ///< what those name; empty: they mean nothing
   std::span<const ActionValue> values = {};                      ///< from the first on; the rest mean nothing
 };

@@ -88,6 +88,10 @@ class World {
   /// That holds a hand's saw. `hand` below kMaxHands.
   [[nodiscard]] const CuttingGuide& cutting_guide(std::uint32_t hand = 0) const { return guides_[hand]; }
   [[nodiscard]] bool held() const { return held_; }
+  /// Whether it is computed beside the bone, as the last action has left it; at the beginning as `simulate` says, else
+  /// not. No state of it is here.
+  [[nodiscard]] bool simulates(Simulated what) const { return simulated_[static_cast<std::size_t>(what)]; }
+  void simulate(Simulated what, bool on) { simulated_[static_cast<std::size_t>(what)] = on; }
   /// How many steps undo can take back.
   [[nodiscard]] std::size_t undo_steps() const;
 
@@ -183,6 +187,7 @@ class World {
   std::array<Grip, kMaxHands> grips_;
   std::array<CuttingGuide, kMaxHands> guides_;
   std::uint32_t next_body_ = 1, next_fixture_ = 1, next_brick_ = 0;
+  std::array<bool, static_cast<std::size_t>(Simulated::behind_last)> simulated_{};
   bool held_ = false;
 };
 
