@@ -66,7 +66,7 @@ int SimulateTraineeCommand::run(const Params& p, cli::Invocation& io) {
   }
   if (!io.common.quiet) {
     io.err << "simulated: " << format_number(std::round(s.seconds * 10) / 10) << " s, removed "
-           << format_number(std::round(s.summary.removed_mm3)) << " mm3"
+           << format_number(std::round(s.summary.removed_mm3 * 10) / 10) << " mm3"
            << (s.finished ? "" : "; its time was up before it had finished") << "\nsession: " << folder.folder.string()
            << "  (trainee.json: skill, and what it knows of what it left)\n";
   }

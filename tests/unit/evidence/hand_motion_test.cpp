@@ -11,7 +11,10 @@
 
 #include "osteo/assessment/evidence/timeline.h"
 #include "osteo/simulation/bone/instrument.h"
+#include "osteo/simulation/haptics/renderer.h"
+#include "osteo/simulation/haptics/simulated_device.h"
 #include "scene.h"
+#include "solid.h"
 
 namespace osteo {
 namespace {
@@ -70,6 +73,51 @@ TEST(IdleClock, TenSecondsAtRestAreTenHoweverTheDeviceTells) {
       std::printf("%-32s %.3f %.3f s\n", d.name.c_str(), idle_s(whole), idle_s(between));
     EXPECT_NEAR(idle_s(whole), 10, 0.2) << d.name;
     EXPECT_NEAR(idle_s(between), 10, 0.2) << d.name;
+  }
+}
+
+// An encoder of 0.03 mm on a device without friction keeps a burr that rests in its own pit trembling, at up to 14 mm/s
+// (docs/validation/haptics.md). A hand that does nothing but rest there is idle, and has no speed near a structure.
+TEST(IdleClock, AHandThatAnEncoderShakesInAPitIsAtRest) {
+  constexpr std::uint64_t kSettledTick = 1000, kTicks = 4000;
+  const SimulatedDeviceParams stepped{.damping_n_s_per_m = 1, .encoder_mm = 0.03};
+  for (const ContactMethod method :
+       {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
+    for (const double radius_mm : {2.0, 2.2, 2.5}) {
+      auto bone = test::solid(
+          0.5, 6,
+          [&](Vec3 p) {
+            return p.z < 1 && length(p - Vec3{0.03, 0.02, 1}) > radius_mm;
+          },
+          {}, 3);
+      SimulatedDevice device(stepped, {0.03, 0.02, 2});
+      device.set_hand({}, {0.03, 0.02, -2}, 0.3);
+      device.set_drill(false, 3);
+      HapticSetup setup;
+      setup.params.contact.method = method;
+      setup.params.effects.vibration = false;
+      setup.device = device.traits();
+      HapticRenderer renderer(setup, bone, {}, 1e-3);
+      IdleClock clock(kHz);
+      HandMotion motion(kHz);
+      Vec3 force;
+      double device_mm_s = 0, told_mm_s = 0;
+      for (std::uint64_t t = 0; t < kTicks; ++t) {
+        TickRecord r = renderer.step(device.read(t, 1e-3, force)).record;
+        force = from_floats(r.force_n);
+        r.tick = t;
+        motion.add(t, from_floats(r.device.position_mm));
+        if (t < kSettledTick) continue;
+        clock.add(r);
+        device_mm_s = std::max(device_mm_s, length(device.velocity_mm_s()));
+        if (const auto speed = motion.speed_mm_s()) told_mm_s = std::max(told_mm_s, *speed);
+      }
+      if (std::getenv("OSTEO_PRINT") != nullptr)
+        std::printf("method %d, pit of %.1f mm: device up to %.1f mm/s, told %.2f mm/s, idle %.3f s\n",
+                    static_cast<int>(method), radius_mm, device_mm_s, told_mm_s, idle_s(clock));
+      EXPECT_NEAR(idle_s(clock), static_cast<double>(kTicks - kSettledTick) / kHz, 0.02);
+      EXPECT_LT(told_mm_s, 1.5);
+    }
   }
 }
 

@@ -210,7 +210,8 @@ TEST(Sessions, UndoTakesBackWhatWasRemoved) {
   EXPECT_FALSE(says(all, "nothing was removed"));
   EXPECT_EQ(value(back.values, "cavity_mm3"), 0);
   EXPECT_GT(value(back.values, "removed_mm3"), 0);  // work was done all the same
-  EXPECT_TRUE(says(back, "nothing was removed"));
+  EXPECT_TRUE(says(back, "all that was removed was taken back"));
+  EXPECT_FALSE(says(back, "nothing was removed"));
   EXPECT_TRUE(says(back, "a step was taken back"));
   EXPECT_FALSE(says(all, "taken back"));
   EXPECT_EQ(find(back.values, "seen_share")->word, "no voxel lost half of its bone");

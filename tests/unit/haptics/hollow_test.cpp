@@ -163,5 +163,30 @@ TEST(Hollows, Benchmark) {
   }
 }
 
+// What of the tremor that an encoder's steps keep up a device's own friction ends: the second table, by the same
+// variable.
+TEST(Hollows, FrictionBenchmark) {
+  if (std::getenv("OSTEO_HOLLOWS") == nullptr) GTEST_SKIP() << "OSTEO_HOLLOWS is not set";
+  for (const ContactMethod m :
+       {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
+    for (const double encoder_mm : {0.01, 0.03}) {
+      std::printf("| %s | %.0f |", EnumNames<ContactMethod>::values[static_cast<std::size_t>(m)].data(),
+                  1000 * encoder_mm);
+      for (const double friction_n : {0.0, 0.05, 0.1, 0.2, 0.3}) {
+        double fastest = 0;
+        for (const Hollow& hollow : kHollows) {
+          for (const double h : {0.3, 0.5}) {
+            const SimulatedDeviceParams d{.damping_n_s_per_m = 1, .friction_n = friction_n, .encoder_mm = encoder_mm};
+            for (const double push : {0.3, 1.0}) fastest = std::max(fastest, rest(hollow, m, h, d, push).fastest_mm_s);
+          }
+        }
+        std::printf(" %.1f |", fastest);
+        std::fflush(stdout);
+      }
+      std::printf("\n");
+    }
+  }
+}
+
 }  // namespace
 }  // namespace osteo

@@ -13,6 +13,7 @@
 #include "osteo/geometry/grid/brick_places.h"
 #include "osteo/simulation/haptics/device.h"
 #include "osteo/simulation/haptics/renderer.h"
+#include "solid.h"
 
 namespace osteo {
 namespace {
@@ -304,6 +305,47 @@ TEST(HandSaw, PlayCostsWhatItsClosedFormSays) {
         EXPECT_GT(p.off_mm, 0.2 * most_mm);
         EXPECT_GT(p.tilt_deg, 0.5 * most_deg);
       }
+    }
+  }
+}
+
+// Behind the blade the chuck comes down on bone that slopes across the plane, and is held by it: it stops the saw, and
+// does not slide down there, for the slot holds the blade. Without a slot it slides.
+TEST(HandSaw, ItsChuckOnASlopeLeavesTheBladeInItsSlot) {
+  const auto slope = [](Vec3 p) { return p.y > 11 && p.z < 0.7 * (p.x - 2); };
+  struct Case {
+    bool guided;
+    int law;
+  };
+  for (const auto [guided, law] : {Case{false, 5}, Case{true, 4}, Case{true, 5}}) {
+    World world(test::solid(0.5, 22, slope, {}, 2));
+    if (guided) {
+      ASSERT_TRUE(world.act(SceneAction::cutting_guide(kGuide)).done);
+    }
+    HapticSetup s = setup();
+    s.params.effects.held_shaft = true;
+    s.params.guard.law = law;
+    HapticScene scene = HapticScene::of(world, s);
+    HapticRenderer r(s, {}, 1e-3);
+    r.show(&scene);
+    double off_mm = 0, lowest_mm = 9;
+    std::uint32_t flags = 0;
+    for (int t = 0; t < 4000; ++t) {
+      const double z = 8 - std::min(10.0, t * 5e-3);  // 5 mm/s, then held
+      const TickRecord record = r.step(held({2, -14, z}, {0, 1, 0}, kSaw, false)).record;
+      flags |= record.flags;
+      const Vec3 tip = from_floats(record.device.position_mm) + from_floats(record.shown_offset_mm);
+      off_mm = std::max(off_mm, std::abs(tip.x - 2));
+      lowest_mm = std::min(lowest_mm, tip.z);
+    }
+    EXPECT_NE(flags & kShaftContact, 0U);
+    EXPECT_EQ((flags & kInSlot) != 0, guided);
+    if (guided && law > 4) {
+      EXPECT_LT(off_mm, 0.02);
+      // A cylinder of 1.5 mm on a slope of 35 degrees.
+      EXPECT_NEAR(lowest_mm, 1.5 * std::hypot(1, 0.7), 0.3);
+    } else {
+      EXPECT_GT(off_mm, 0.5);  // in its slot too, as sessions of before repeat it
     }
   }
 }

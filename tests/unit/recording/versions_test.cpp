@@ -257,8 +257,8 @@ TEST(Versions, WhatTheServoCannotRepeatIsSaid) {
   EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["kernels"]["contact"] = 1000; }).find("other bits"),
             std::string::npos);
   // The guards of before are here still.
-  EXPECT_EQ(SessionReader(path).header().haptics.params.guard.law, 4);
-  for (const int contact : {2, 3, 4}) {
+  EXPECT_EQ(SessionReader(path).header().haptics.params.guard.law, 5);
+  for (const int contact : {2, 3, 4, 5}) {
     EXPECT_EQ(why(test::tick_fields(), [&](ordered_json& j) { j["kernels"]["contact"] = contact; }), "");
     EXPECT_EQ(SessionReader(path).header().haptics.params.guard.law, contact - 1);
     EXPECT_EQ(ordered_json::parse(header_json(SessionReader(path).header()))["kernels"]["contact"], contact);

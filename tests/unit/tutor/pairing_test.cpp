@@ -4,8 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <new>
+#include <random>
 
 #include "handshake.h"
 #include "osteo/network/tutor/live.h"
@@ -139,6 +142,41 @@ TEST(PairingRoom, AfterAnOutageTheTraineeIsInFirstAndAllComeBack) {
               << one_way << " " << loss << " " << n;
       }
     }
+  }
+}
+
+// The line falls silent while they pair, both ways or one: at any moment of it, for a blink or longer than the host
+// remembers. A router that comes back often gives everybody another address. All are in afterwards, each of them once,
+// and stay.
+TEST(PairingRoom, AnOutageWhileTheyPairKeepsNobodyOut) {
+  std::mt19937 random(33);
+  const auto any = [&](double lo, double hi) { return lo + (hi - lo) * static_cast<double>(random()) / 4294967296.0; };
+  for (int trial = 0; trial < 48; ++trial) {
+    Lobby room;
+    room.seed = static_cast<std::uint64_t>(1000 + 100 * trial);
+    const double one_way = std::array{1.0, 60.0, 200.0}[static_cast<std::size_t>(trial % 3)];
+    const double loss = trial % 2 == 0 ? 0 : 0.2;
+    const int n = std::array{1, 2, 5, 9}[static_cast<std::size_t>(trial / 3 % 4)];
+    const bool up = trial % 5 != 0, down = trial % 5 != 1, elsewhere = trial % 4 == 3;
+    const double before_s = any(0, 6e-3 * one_way + 0.2), out_s = std::exp(any(std::log(0.05), std::log(14)));
+    for (int i = 0; i < n; ++i)
+      room.enter(i == n / 2 ? JoinRole::trainee : JoinRole::watcher, {one_way, one_way / 5, loss, 0});
+    room.run(before_s);
+    for (const auto& s : room.seats) s->up.cut = up, s->down.cut = down;
+    room.run(out_s);
+    room.cut(false);
+    for (const auto& s : room.seats) s->port = static_cast<std::uint16_t>(s->port + (elsewhere ? 500 : 0));
+    const std::string what = std::to_string(trial) + ": " + std::to_string(n) + " at " + std::to_string(one_way) +
+                             " ms, out after " + std::to_string(before_s) + " s for " + std::to_string(out_s) + " s";
+    ASSERT_GE(room.settle(20), 0) << what;
+    // Who was in before the outage, or is by a welcome of before it, may notice only now that nobody is there.
+    room.run(4);
+    ASSERT_GE(room.settle(20), 0) << what;
+    room.run(4);
+    EXPECT_EQ(room.joined(), static_cast<std::size_t>(n)) << what;
+    const auto status = room.host.status(room.now);
+    EXPECT_EQ(std::count_if(status.begin(), status.end(), [](const PeerStatus& p) { return p.heard; }), n) << what;
+    EXPECT_EQ(room.host.tries_left(), PairingHost::kTries) << what;
   }
 }
 

@@ -557,6 +557,9 @@ TEST(EndFacts, TellWhatWasDone) {
   EXPECT_EQ(value("dura").nearness, Nearness::close);
   EXPECT_EQ(value("sigmoid sinus").nearness, Nearness::touched);
   EXPECT_NE(value("sigmoid sinus").value.find("INJURED"), std::string::npos);
+  EXPECT_EQ(facts.summary, "1:02:05 min, 30 mm³ of bone");
+  session.removed_mm3 = 0.2;
+  EXPECT_EQ(end_facts(session, work).summary, "1:02:05 min, 0.2 mm³ of bone") << "as if nothing had been removed";
   session.score = "81 of 100";
   EXPECT_EQ(end_facts(session, work).lines[1].value, "81 of 100");
 }

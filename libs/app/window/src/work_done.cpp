@@ -130,9 +130,9 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
           s.least_clearance_mm < StateFacts::kNearMm ? Nearness::near : Nearness::far);
     }
   }
-  out.summary =
-      filled(tr("{time} min, {mm3} mm³ of bone"),
-             {{"time", clock_text(session.seconds)}, {"mm3", shown_number(session.removed_mm3 + session.sawn_mm3, 0)}});
+  const double bone_mm3 = session.removed_mm3 + session.sawn_mm3;
+  out.summary = filled(tr("{time} min, {mm3} mm³ of bone"),
+                       {{"time", clock_text(session.seconds)}, {"mm3", shown_number(bone_mm3, bone_mm3 < 10 ? 1 : 0)}});
   if (session.score) out.summary += ", " + *session.score;
   out.warnings = session.warnings;
   out.folder = session.folder;

@@ -289,11 +289,17 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   score.seconds_frames = now_s() - t;
   score.values = keeper.values();
   score.moments = keeper.moments();
-  // The final product goes by voxels that lost half of their bone.
-  if (keeper.removed().empty() && first.volume_mm3() - end.volume_mm3() < 1e-3) {
-    score.words.push_back("nothing was removed");
-  } else if (keeper.removed().empty()) {
-    score.words.push_back("less was removed than half of any voxel");
+  // The final product goes by voxels that lost half of their bone; the work by all that was taken, however little.
+  if (keeper.removed().empty()) {
+    const bool worked = std::any_of(score.values.begin(), score.values.end(), [](const Measured& m) {
+      return (m.name() == "removed_mm3" || m.name() == "sawn_mm3") && m.value.value_or(0) > 0;
+    });
+    if (!worked)
+      score.words.push_back("nothing was removed");
+    else if (undone > 0 && first.volume_mm3() - end.volume_mm3() < 1e-6)
+      score.words.push_back("all that was removed was taken back");
+    else
+      score.words.push_back("less was removed than half of any voxel");
   }
   if (undone > 0)
     score.words.push_back(

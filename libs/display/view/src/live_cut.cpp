@@ -92,7 +92,7 @@ void draw_live_cut(const SliceView& view, const LiveCut& cut, std::vector<std::u
       float now = 0;
       const Even* from = &ct_here;
       for (const Laid& l : laid) {
-        const float d = linear_beside(*l.bone, l.index.at(x, y));
+        const float d = linear_at(*l.bone, l.index.at(x, y));
         if (d <= now) continue;
         now = d;
         from = &l.ct;

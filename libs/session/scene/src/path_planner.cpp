@@ -193,7 +193,7 @@ std::size_t PathPlanner::touching_bone(const HandPose& pose, double margin_mm, s
       const auto round = [](double v) { return static_cast<int>(std::floor(v + 0.5)); };
       if (!(bone.at(round(x.x), round(x.y), round(x.z)) >= least)) continue;
       // Without room to keep it matters where in the voxel: a bore is as narrow as what drilled it.
-      if (margin_mm > 0 || linear_beside(bone, x) >= least) ++count;
+      if (margin_mm > 0 || linear_at(bone, x) >= least) ++count;
       if (count > most) return count;
     }
   }

@@ -41,7 +41,7 @@ double LiveBone::density(Vec3 at) const {
     const BrickGrid& bone = placed.body->bone;
     const Vec3 x = bone.frame().index_from_world(placed.world_from_body.inverse()(at));
     if (!(std::abs(x.x) < 1e6 && std::abs(x.y) < 1e6 && std::abs(x.z) < 1e6)) continue;
-    most = std::max(most, static_cast<double>(linear_beside(bone, x)));
+    most = std::max(most, static_cast<double>(linear_at(bone, x)));
   }
   return most;
 }

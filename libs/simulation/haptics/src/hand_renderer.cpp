@@ -317,7 +317,9 @@ void HandRenderer::hold_shaft(Vec3& elastic, Vec3& torque) noexcept {
                        item.body_from_world};
     shell = std::min(shell, 0.5 * item.bone->bone().frame().spacing_mm.x);
   }
-  const HeldShaft::Answer held = shaft_.follow({bodies.data(), count}, shape, shell, at_, axis_);
+  const bool slot = (flags_ & kInSlot) != 0 && common_.params.guard.law > 4;
+  const HeldShaft::Answer held =
+      shaft_.follow({bodies.data(), count}, shape, shell, at_, axis_, slot ? slot_.across() : Vec3{});
   const double far = length(held.offset_mm);
   if (!(far > 0)) return;
   const double push = law_.force_n(far);

@@ -15,6 +15,9 @@ constexpr int kAgainCalls = 64;
 constexpr double kCrumb = 0.2;
 // Of the bone at its surface so much must be pushed one way for it to have a direction.
 constexpr double kOneWay = 0.1;
+// Of a push the share that lies in a slot's plane and has a direction; and how little the depth may seem to change
+// there.
+constexpr double kFlatShare = 0.01, kLeastSlope = 0.1;
 // So that small doubts about where a rim faces do not make it wander: a shaft has more.
 constexpr double kFriction = 0.05;
 
@@ -113,7 +116,7 @@ OverlapResult HeldShaft::measure(const RoundCone& shaft, double grown_mm, Vec3 a
 }
 
 HeldShaft::Answer HeldShaft::follow(std::span<const Body> bodies, const RoundCone& shaft, double shell_mm, Vec3 at_mm,
-                                    Vec3 axis) noexcept {
+                                    Vec3 axis, Vec3 across) noexcept {
   Answer a;
   if (!std::isfinite(dot(at_mm, at_mm)) || !std::isfinite(dot(axis, axis))) {
     forget();
@@ -127,6 +130,8 @@ HeldShaft::Answer HeldShaft::follow(std::span<const Body> bodies, const RoundCon
       first ? 0 : length(at_mm - last_at_mm_) + (shaft.start_mm + shaft.length_mm) * length(axis - last_axis_);
   last_at_mm_ = at_mm;
   last_axis_ = axis;
+  const bool slot = !(across == Vec3{});
+  if (slot && !first) proxy_.carry(across * dot(at_mm - proxy_.position_mm(), across));
   look(shaft, first ? at_mm : proxy_.position_mm(), axis);
   // Held by nothing: all that the shaft can touch on its way is looked at once.
   if (first || offset_mm_ == Vec3{}) {
@@ -151,7 +156,14 @@ HeldShaft::Answer HeldShaft::follow(std::span<const Body> bodies, const RoundCon
     const double crumb = std::min(1.0, surface / (kCrumb * h * h)), depth = 2 * there.sharp_mm3 / surface * crumb;
     c.value_mm = shell_mm - depth;
     one_way = pressed > kOneWay * surface;
-    if (one_way) {
+    if (one_way && slot) {
+      // The slot takes what presses across it. What is left presses in its plane, by its share.
+      const Vec3 normal = there.area_mm2 * (-1 / pressed), flat = normal - across * dot(normal, across);
+      const double share = length(flat);
+      c.value_mm = shell_mm - depth * share;
+      c.normal = share > kFlatShare ? flat / share : axis;
+      c.gradient = c.normal * std::clamp(1.5 * pressed / surface * share * share, kLeastSlope, 1.5);
+    } else if (one_way) {
       c.normal = there.area_mm2 * (-1 / pressed);
       c.gradient = c.normal * std::clamp(1.5 * pressed / surface, 0.5, 1.5);
     } else if (c.value_mm < 0) {

@@ -36,16 +36,15 @@ constexpr double kRounding = 1e-6;
 
 // Where density grows, by central differences. Neighbours mostly lie in the same brick, where they are a step away.
 Vec3 density_slope(const BrickGrid& bone, VoxelKey voxel) noexcept {
-  const std::uint32_t brick = voxel / BrickGrid::kVoxels, place = voxel % BrickGrid::kVoxels;
-  const float* const v = bone.values_of_brick(brick);
+  const std::uint32_t place = voxel % BrickGrid::kVoxels;
   const Ijk c = bone.coordinate(voxel);
   Vec3 slope;
   constexpr std::uint32_t kStep[3] = {1, 8, 64};
   for (std::size_t a = 0; a < 3; ++a) {
     const std::uint32_t at = place / kStep[a] % 8;
     const int di = a == 0 ? 1 : 0, dj = a == 1 ? 1 : 0, dk = a == 2 ? 1 : 0;
-    const float below = at > 0 ? v[place - kStep[a]] : bone.at(c.i - di, c.j - dj, c.k - dk);
-    const float above = at < 7 ? v[place + kStep[a]] : bone.at(c.i + di, c.j + dj, c.k + dk);
+    const float below = at > 0 ? bone.value(voxel - kStep[a]) : bone.at(c.i - di, c.j - dj, c.k - dk);
+    const float above = at < 7 ? bone.value(voxel + kStep[a]) : bone.at(c.i + di, c.j + dj, c.k + dk);
     slope[a] = static_cast<double>(above - below);
   }
   return slope;

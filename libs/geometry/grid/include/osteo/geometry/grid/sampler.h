@@ -37,8 +37,8 @@ class GridSampler {
   return mix(mix(mix(d[0], d[1], u), mix(d[2], d[3], u), v), mix(mix(d[4], d[5], u), mix(d[6], d[7], u), v), w);
 }
 
-/// Linear in each direction at a point in index coordinates; what is not stored is 0. For the thread that writes, or
-/// when nobody does. 25 ns within a brick, three times that where it reaches into others.
+/// Linear in each direction at a point in index coordinates; what is not stored is 0. While another thread writes each
+/// value is old or new, never torn. 25 ns within a brick, three times that where it reaches into others.
 [[nodiscard]] inline float linear_at(const BrickGrid& bone, Vec3 index) noexcept {
   const double fi = std::floor(index.x), fj = std::floor(index.y), fk = std::floor(index.z);
   const int i = static_cast<int>(fi), j = static_cast<int>(fj), k = static_cast<int>(fk);
@@ -48,22 +48,11 @@ class GridSampler {
   if ((i & 7) != 7 && (j & 7) != 7 && (k & 7) != 7) {
     const VoxelKey first = bone.find(i, j, k);
     if (first == BrickGrid::kNone) return 0;
-    const float* const p = bone.values_of_brick(first / BrickGrid::kVoxels) + first % BrickGrid::kVoxels;
-    for (int c = 0; c < 8; ++c) d[c] = p[(c & 1) + (c >> 1 & 1) * 8 + (c >> 2) * 64];
+    for (std::uint32_t c = 0; c < 8; ++c) d[c] = bone.value(first + (c & 1) + (c >> 1 & 1) * 8 + (c >> 2) * 64);
   } else {
     for (int c = 0; c < 8; ++c) d[c] = bone.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
   }
   return mix_linear(d, u, v, w);
-}
-
-/// The same while another thread writes: each value is old or new, never torn.
-[[nodiscard]] inline float linear_beside(const BrickGrid& bone, Vec3 index) noexcept {
-  const double fi = std::floor(index.x), fj = std::floor(index.y), fk = std::floor(index.z);
-  const int i = static_cast<int>(fi), j = static_cast<int>(fj), k = static_cast<int>(fk);
-  float d[8];
-  for (int c = 0; c < 8; ++c) d[c] = bone.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-  return mix_linear(d, static_cast<float>(index.x - fi), static_cast<float>(index.y - fj),
-                    static_cast<float>(index.z - fk));
 }
 
 }  // namespace osteo::inline geometry

@@ -17,7 +17,7 @@ namespace osteo::inline session {
 /// what it stands for gives other bits.
 struct Kernels {
   int burrs = kBurrLibraryVersion;
-  int contact = 5;  ///< forces, guard and removal; 2 to 4 are repeated by GuardParams::law 1 to 3
+  int contact = 6;  ///< forces, guard and removal; 2 to 5 are repeated by GuardParams::law 1 to 4
   int scene = 1;    ///< what World::act does
   friend bool operator==(const Kernels&, const Kernels&) = default;
 };

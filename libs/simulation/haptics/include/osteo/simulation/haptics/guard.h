@@ -26,10 +26,11 @@ struct GuardParams {
   double resume_s = 0.1;
   double stale_ms = 10;
   double fade_ms = 40;
-  /// Which arithmetic; no setting. 4, or for the replay of sessions whose kernel of contact is less than 5: 3, where a
-  /// saw slides across its slot (ContactModel::hold); 2, which besides damps by the stiffness asked for and not by the
-  /// real one; 1, where besides nothing is owed from one contact to the next, and drag may give energy.
-  int law = 4;
+  /// Which arithmetic; no setting. 5, or for the replay of sessions whose kernel of contact is less than 6: 4, where
+  /// bone at its chuck draws a saw out of its slot (HeldShaft); 3, where besides it slides across it
+  /// (ContactModel::hold); 2, which besides damps by the stiffness asked for and not by the real one; 1, where besides
+  /// nothing is owed from one contact to the next, and drag may give energy.
+  int law = 5;
 
   static void describe(GuardParams& p, auto& visit) {
     visit({"limit_force_n", "the hand never feels more", "N", 0, 100}, p.max_force_n);

@@ -37,7 +37,9 @@ class HeldShaft {
   /// `at_mm`, `axis` (unit) as of the instrument, in the world. A place that is not a number forgets. Cost: next
   /// to nothing while no bone is within a millimetre and a half, else an overlap of the part of the shaft that is near
   /// bone, mostly 2 to 4 in contact, 16 at most. Bone that comes back beside the shaft may be noticed 200 calls later.
-  Answer follow(std::span<const Body> bodies, const RoundCone& shaft, double shell_mm, Vec3 at_mm, Vec3 axis) noexcept;
+  /// `across` (unit; zero: none): a slot holds the tool there, so bone moves it in the slot's plane alone.
+  Answer follow(std::span<const Body> bodies, const RoundCone& shaft, double shell_mm, Vec3 at_mm, Vec3 axis,
+                Vec3 across = {}) noexcept;
   void forget() noexcept;
   [[nodiscard]] Vec3 offset_mm() const { return offset_mm_; }  ///< of the last call
 
