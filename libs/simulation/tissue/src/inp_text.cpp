@@ -7,7 +7,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/simulation/tissue/problem.h"
-#include "tet_faces.h"
+#include "outer_faces.h"
 
 namespace osteo::inline simulation {
 namespace {
@@ -86,43 +86,10 @@ Rigid rigid_ball(const RigidShape::Ball& ball) {
 // Contact pairs. Here each point of the surface is pushed by itself; there pressure grows with depth, by as much over
 // what looks at the thing.
 std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& contacts) {
-  std::map<std::array<std::uint32_t, 3>, std::pair<std::size_t, std::size_t>> faces;  // element, face; those of two go
-  for (std::size_t e = 0; e < body.tet_count(); ++e) {
-    for (std::size_t f = 0; f < 4; ++f) {
-      std::array<std::uint32_t, 3> face{body.nodes(e)[kTetFaces[f][0]], body.nodes(e)[kTetFaces[f][1]],
-                                        body.nodes(e)[kTetFaces[f][2]]};
-      std::sort(face.begin(), face.end());
-      if (!faces.try_emplace(face, e, f).second) faces.erase(face);
-    }
-  }
+  const std::vector<OuterFace> faces = outer_faces(body);
   std::string t = "*SURFACE, NAME=BODY, TYPE=ELEMENT\n";
-  for (const auto& [face, where] : faces)
-    t += std::to_string(where.first + 1) + ", S" + std::to_string(where.second + 1) + "\n";
-  // Points over area of the faces that look at a thing (within 45 degrees); of all where none does.
-  const auto points_per_mm2 = [&](const auto& towards) {
-    for (const double least : {std::sqrt(0.5), -2.0}) {
-      double area = 0;
-      std::vector<std::array<std::uint32_t, 2>> points;  // corners twice the same, middles by their ends
-      for (const auto& [face, where] : faces) {
-        const auto& own = kTetFaces[where.second];
-        const auto at = [&](std::size_t i) { return body.rest()[body.nodes(where.first)[own[i]]]; };
-        const auto others = 6 - own[0] - own[1] - own[2];
-        Vec3 out = cross(at(1) - at(0), at(2) - at(0)) * 0.5;
-        if (dot(out, at(0) - body.rest()[body.nodes(where.first)[others]]) < 0) out = out * -1;
-        if (dot(out, towards((at(0) + at(1) + at(2)) / 3)) < least * length(out)) continue;
-        area += length(out);
-        for (std::size_t i = 0; i < 3; ++i) {
-          points.push_back({face[i], face[i]});
-          if (body.order() == TetOrder::t10)
-            points.push_back({std::min(face[i], face[(i + 1) % 3]), std::max(face[i], face[(i + 1) % 3])});
-        }
-      }
-      std::sort(points.begin(), points.end());
-      points.erase(std::unique(points.begin(), points.end()), points.end());
-      if (area > 0) return static_cast<double>(points.size()) / area;
-    }
-    return 1.0;
-  };
+  for (const OuterFace face : faces)
+    t += std::to_string(face.element + 1) + ", S" + std::to_string(face.face + 1) + "\n";
   std::size_t node = body.point_count(), element = body.tet_count();
   int number = 0;
   for (const RigidContact& c : contacts) {
@@ -132,8 +99,7 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
       throw Error(ExitCode::usage, "only planes and balls are written to .inp as rigid things",
                   "choose a load without other contacts");
     const Rigid r = plane != nullptr ? rigid_plane(*plane, body.rest()) : rigid_ball(ball->bounds());
-    const double density = points_per_mm2(
-        [&](Vec3 at) { return plane != nullptr ? plane->normal() * -1 : normalized(ball->bounds().centre_mm - at); });
+    const double density = points_per_mm2(body, faces, *c.shape);
     const std::string name = std::to_string(++number);
     t += "*NODE, NSET=RIGID" + name + "\n";
     for (std::size_t p = 0; p < r.points.size(); ++p)

@@ -116,14 +116,14 @@ class FemBody final : public Energy {
 struct Statics : Equilibrium {
   Vec3 reaction_n;             ///< on what is held or moved: what holds it exerts
   Vec3 contact_n;              ///< of rigid things on the body
-  std::uint64_t touching = 0;  ///< points in contact
+  std::uint64_t touching = 0;  ///< points in contact; of quadratic elements the seven places of each face
 };
 
 /// Where `body` comes to rest under `load`, as FemBody::on_all_points() makes it. Movements are prescribed to the full;
 /// where the law has no finite energy there, they and the forces grow in 4, 16 and 64 steps. A rigid thing pushes each
-/// point of the body's surface (of quadratic elements in the middle of edges too) out along its shortest way by its
-/// stiffness times the depth: the depth that is left is the force over the stiffness. A body that contact alone holds
-/// can still move freely. Errors: as of EquilibriumSolver.
+/// point of the body's surface out along its shortest way by its stiffness times the depth, of quadratic elements the
+/// faces, by as much for each area as points that look at it have: the depth that is left is the force over it. A body
+/// that contact alone holds can still move freely. Errors: as of EquilibriumSolver.
 [[nodiscard]] Statics statics(const FemBody& body, const TissueLoad& load, const EquilibriumOptions& options = {},
                               const Context& context = {});
 

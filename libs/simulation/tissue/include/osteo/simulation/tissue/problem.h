@@ -57,7 +57,7 @@ enum class Weight { among_forces, apart };
 /// gravity that is apart as GRAV; else weight is among the forces (*CLOAD). Displacements are printed to the .dat file.
 /// Contact with planes (one triangle) and balls (5120, off by 0.1 % of the radius) is a *CONTACT PAIR, surface to
 /// surface, against tetrahedra that are held; its pressure grows with depth by stiffness_n_per_mm times points over
-/// area of what looks at it. There faces are pushed, here points: the same for a plane but for the depth that is left,
+/// area of what looks at it. There faces are pushed, here points of t4: the same for a plane but for the depth left,
 /// and for a ball as far as the mesh resolves what it touches. Not read back. Error(usage) for neo_hooke, corotated and
 /// t4_mean, which are not known there, for rigid things of another shape, and for gravity on what has no density.
 [[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
