@@ -17,7 +17,7 @@ using namespace tissue;
 
 StageInfo FemStage::info() {
   return {.name = "fem",
-          .version = 4,
+          .version = 5,
           .synopsis = "how a soft body deforms under a load, by finite elements",
           .description =
               "Static equilibrium of tetrahedra under dead loads: Newton's method with exact Hessians and sparse "
