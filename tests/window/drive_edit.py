@@ -281,7 +281,8 @@ with Screen("1024x700") as screen:
     press()
     w.until("no network", lambda t: "holds no trained network" in t["message"] and not t["busy"])
     shutil.move("elsewhere", "network")
-    w.x("key", "q")
+    w.key("q", "asks", lambda t: t["asking"])
+    w.x("key", "d")
     w.end()
 
 # Nothing of the scan lies about but in the reports, which say that they hold pictures of it.
