@@ -203,6 +203,14 @@ def asked():
     with Screen():
         host = Window("--tutor", "--no-sound", "-o", "asked")
         address, code = invited(host)
+        for flag in ("--dust", "--heat"):
+            refused = subprocess.run(
+                [bin_dir / "osteo-rehearse", "case", "--join", address, "--code", code, "--no-sound", flag],
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE_S,
+            )
+            assert refused.returncode == 2 and f"{flag} does not go with --join" in refused.stderr, refused
         app = subprocess.Popen(
             [
                 bin_dir / "osteo-rehearse",

@@ -34,8 +34,11 @@ LiveSessionRunner::LiveSessionRunner(const WindowFlags& flags)
   if (!flags.resume.empty() && joins())
     throw Error(ExitCode::usage, "--resume does not go with --join",
                 "the session is the host's; leave one of them out");
-  if (flags.dust && joins())
-    throw Error(ExitCode::usage, "--dust does not go with --join", "the host switches it for all; leave it out");
+  for (const auto& [given, flag] : {std::pair(flags.dust, "--dust"), std::pair(flags.heat, "--heat")}) {
+    if (given && joins())
+      throw Error(ExitCode::usage, std::string(flag) + " does not go with --join",
+                  "the host switches it for all; leave it out");
+  }
   if (flags.monitor && joins()) throw Error(ExitCode::usage, "--monitor does not go with --join", "the host has it");
   if (hosts_) code_ = make_pairing_code();
   if (!joins()) return;

@@ -207,9 +207,8 @@ struct WindowCommand {
     actions.stop = [&] { return io.context.cancelled(); };
     actions.monitor = [&] { return session_runner.monitor(); };
     actions.turn_monitor = [&](bool on) { return session_runner.turn_monitor(on); };
-    const bool own = p.join.empty() && p.review.empty();
-    if (own) actions.simulate = [&](Simulated what, bool on) { session_runner.simulate(what, on); };
-    const PersonValues before = person.values;
+    if (p.join.empty() && p.review.empty())
+      actions.simulate = [&](Simulated what, bool on) { session_runner.simulate(what, on); };
     if (p.tutor || !p.join.empty() || !p.playback.empty()) {
       actions.tutor = [&] { return session_runner.tutor(); };
       actions.steps = [&](const std::vector<std::string>& injured) { return session_runner.steps(injured); };
@@ -228,10 +227,6 @@ struct WindowCommand {
       throw;
     }
     session_runner.save_at_exit(false);
-    if (!own) {  // as the host had them
-      person.values.dust = before.dust;
-      person.values.heat = before.heat;
-    }
     person.values.sound = session_runner.sound().on();
     person.values.volume = session_runner.sound().volume();
     person.values.alarms = session_runner.sound().alarms();
@@ -324,7 +319,13 @@ struct WindowCommand {
       start.folder = fs::absolute(choice->case_folder).parent_path();
       choice.reset();
       if (left.dropped) choice = choice_of(*left.dropped, start.message);
-      if (left.changed) take_switches(person.values, flags);
+      if (left.changed) {
+        take_switches(person.values, flags);
+        if (flags.join.empty() && flags.review.empty()) {  // it goes on as it was
+          flags.dust = left.dust;
+          flags.heat = left.heat;
+        }
+      }
       chosen_in_window = true;
       flags.out.clear();
       flags.review.clear();

@@ -283,6 +283,7 @@ void SessionRunner::run(World world, std::vector<std::unique_ptr<Device>> device
       header.rate_hz = options_.rate_hz;
       header.haptics = options_.haptics;
       header.dust = options_.follow.dust;
+      header.heat = options_.follow.heat;
     }
     if (live_.hosts() && procedure_ != nullptr && options_.anatomy.structures)
       progress_ = std::make_unique<ProcedureProgress>(*procedure_, *options_.anatomy.structures, world.copy());

@@ -165,10 +165,8 @@ class HeadlessSession {
   void read_script(const World& world, int tool) {
     script_ = p_.script.empty() ? make_default_script(world, p_.side == Side::left, tool, p_.seconds)
                                 : load_script(p_.script, planned_cuts_of(case_.folder));
-    doubts_ = warnings_about(script_, world, p_.dust);
+    doubts_ = warnings_about(script_, world, p_.dust, p_.position != Posture::supine || p_.head_turned_deg != 0);
     for (const std::string& d : doubts_) io_.context.warn(d);
-    if (!p_.dust && (p_.position != Posture::supine || p_.head_turned_deg != 0))
-      io_.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
   }
 
   void begin_folder() {

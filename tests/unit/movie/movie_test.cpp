@@ -38,8 +38,10 @@ Script hole() {
                  {1.6, {0, 0, 7}, true}, {1.9, {9, 9, 9}, false},  {5, {9, 9, 9}, false}};
   return s;
 }
-void record(const std::filesystem::path& file, const std::vector<const char*>& cameras, bool dust = false) {
+void record(const std::filesystem::path& file, const std::vector<const char*>& cameras, bool dust = false,
+            std::vector<SceneAction> actions = {}) {
   RehearsalOptions o;
+  o.actions = std::move(actions);
   o.session_file = file;
   o.haptics.device = SpringHand::traits();
   o.follow.dust = dust;
@@ -216,6 +218,17 @@ TEST(Movie, WhatCannotBeRunAgainIsToldAsRecordedWithTheSameBone) {
   EXPECT_FALSE(reported.repeated);
   ASSERT_EQ(reported.words.size(), 1U);
   EXPECT_NE(reported.words[0].find("tenth of a second"), std::string::npos);
+  EXPECT_NE(reported.words[0].find("dust lies a little elsewhere"), std::string::npos);
+  // Dust that begins later is dust, and what never begins is none.
+  for (const bool on : {true, false}) {
+    const std::filesystem::path file = scratch / (on ? "on.oss" : "off.oss");
+    SceneAction later = SceneAction::simulate(Simulated::dust, on);
+    later.tick = 1000;
+    record(file, {kFromAbove}, false, {later});
+    const MovieFacts facts = make_movie(SessionReader(file), block(), other, o, scratch / "later.mp4");
+    ASSERT_EQ(facts.words.size(), 1U);
+    EXPECT_EQ(facts.words[0].find("dust lies a little elsewhere") != std::string::npos, on);
+  }
   EXPECT_LT(difference(frames_of(scratch / "again.mp4").back(), frames_of(scratch / "told.mp4").back()), 3);
   // Cut short: what there is.
   std::filesystem::copy_file(scratch / "s.oss", scratch / "cut.oss");

@@ -216,6 +216,32 @@ TEST(Versions, AnEarlierSessionWithoutAFieldIsRead) {
   fs::remove(path);
 }
 
+// What a session begins with; older ones do not tell of heat.
+TEST(Versions, DustAndHeatOfTheBeginningAreInTheHeader) {
+  const auto path = fresh("begins.oss");
+  for (const bool on : {true, false}) {
+    SessionHeader h = header("this");
+    h.heat = on;
+    h.dust = !on;
+    {
+      test::OtherWriter w(path, h, test::tick_fields());
+      w.ticks(some_ticks(0, 5));
+      w.end_frame(2, 0, 5);
+    }
+    EXPECT_EQ(read_session(path).header.heat, on);
+    EXPECT_EQ(read_session(path).header.dust, !on);
+  }
+  SessionHeader h = header("older");
+  h.heat = true;
+  {
+    test::OtherWriter w(path, h, test::tick_fields(), [](ordered_json& j) { EXPECT_EQ(j.erase("heat"), 1U); });
+    w.ticks(some_ticks(0, 5));
+    w.end_frame(2, 0, 5);
+  }
+  EXPECT_FALSE(read_session(path).header.heat);
+  fs::remove(path);
+}
+
 TEST(Versions, NumbersOfAnotherTypeAreConverted) {
   const auto path = fresh("types.oss");
   struct Wide {

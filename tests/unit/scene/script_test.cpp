@@ -147,9 +147,9 @@ TEST(ScriptedScene, PosesThatAreNoneAreCounted) {
 
 TEST(ScriptedScene, WarningsAboutAScript) {
   const World world(test::bar(0.5, 0));
-  const auto warnings = [&](Script s, bool dust = false) {
+  const auto warnings = [&](Script s, bool dust = false, bool laid = false) {
     std::string all;
-    for (const std::string& d : warnings_about(s, world, dust)) all += d + "\n";
+    for (const std::string& d : warnings_about(s, world, dust, laid)) all += d + "\n";
     return all;
   };
   Script s = press();
@@ -170,6 +170,11 @@ TEST(ScriptedScene, WarningsAboutAScript) {
   EXPECT_NE(warnings(s).find("--dust"), std::string::npos);
   s.actions.push_back({0.05, SceneAction::simulate(Simulated::dust, true)});
   EXPECT_EQ(warnings(s), "") << "it begins there";
+  // As the patient lies.
+  EXPECT_EQ(warnings(s, false, true), "");
+  s.actions = {{0.05, SceneAction::simulate(Simulated::dust, false)}};
+  EXPECT_NE(warnings(s, false, true).find("how the patient lies"), std::string::npos) << "it never begins";
+  EXPECT_EQ(warnings(s, true, true), "");
 }
 
 }  // namespace

@@ -144,6 +144,19 @@ TEST(Simulate, EndsAndBeginsAgain) {
   expect_same(off, o.session_file);
 }
 
+// A copy elsewhere, and whoever looks at the session later, know of it from the header.
+TEST(Simulate, WhatASessionBeginsWithIsInItsHeader) {
+  const test::ScratchFolder scratch;
+  RehearsalOptions o = options(scratch / "s.oss");
+  o.follow.heat = true;
+  const Found live = run(o);
+  EXPECT_GT(live.heat_j, 0);
+  const SessionReader session(o.session_file);
+  EXPECT_TRUE(session.header().heat);
+  EXPECT_FALSE(session.header().dust);
+  expect_same(live, o.session_file);
+}
+
 TEST(Simulate, NonsenseIsRejected) {
   World w = bar();
   SceneAction a = dust(true);

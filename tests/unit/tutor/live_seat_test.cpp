@@ -34,8 +34,9 @@ bool comes(const std::function<bool()>& what, const std::function<std::uint64_t(
 
 // A session of an instructor's hand that drills, and of one who joins.
 struct Hosted {
-  Hosted() {
+  explicit Hosted(bool heat = false) {
     options.follow.surface = false;
+    options.follow.heat = header.heat = heat;
     auto own = std::make_unique<test::SimHand>(Vec3{0, 0, 6});
     own->device().set_hand({}, {0, 0, 4.6}, 0.6);
     options.haptics.device = own->traits();
@@ -117,6 +118,41 @@ TEST(LiveSeat, WhoJoinsHasAllOfTheSessionWhenItIsOver) {
     hosted.rehearsal->look([&](const World& world, SceneReaders&) { bone = world.hash(); });
     EXPECT_NE(bone, hosted.header.bone_hash) << "nothing was drilled";
     EXPECT_EQ(seat.bone_hash(), bone);
+    hosted.net.reset();
+  }
+}
+
+// Whatever was asked for here: what the session begins with is the host's.
+TEST(LiveSeat, ACopyHasHeatWhereItsHostHas) {
+  for (const bool host_has : {true, false}) {
+    Hosted hosted(host_has);
+    LiveSeat seat(hosted.seat(JoinRole::watcher));
+    const SessionHeader theirs = seat.wait_for_session(60, {});
+    RehearsalOptions copied;
+    copied.follow.surface = false;
+    copied.follow.heat = copied.follow.dust = !host_has;
+    const auto copy = seat.begin(theirs, World(test::bar(0.5, 0.3)), copied, nullptr, {});
+    EXPECT_EQ(copy->simulates(Simulated::heat), host_has);
+    EXPECT_FALSE(copy->simulates(Simulated::dust));
+    ASSERT_TRUE(comes([&] {
+      const auto all = hosted.host->status(steady_us());
+      return !all.empty() && all.front().ready;
+    }));
+    hosted.rehearsal->start();
+    ASSERT_TRUE(comes([&] { return seat.status().ticks >= 400; }));
+    const RehearsalSummary s = hosted.rehearsal->stop();
+    hosted.net->over(s.ticks);
+    wait_for_all(*hosted.host, 60);
+    ASSERT_TRUE(comes([&] { return seat.status().over; }, [&] { return seat.status().ticks; }));
+    seat.leave();
+    copy->stop();
+    const auto joules = [](Rehearsal& r) {
+      double j = 0;
+      r.look([&](const World&, SceneReaders& readers) { j = readers.heat ? readers.heat->ledger().added_j : -1; });
+      return j;
+    };
+    EXPECT_EQ(joules(*copy), joules(*hosted.rehearsal));
+    EXPECT_EQ(joules(*copy) > 0, host_has) << "drilling warms";
     hosted.net.reset();
   }
 }

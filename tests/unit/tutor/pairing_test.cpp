@@ -360,18 +360,21 @@ TEST(Pairing, AnotherProtocolIsRefused) {
     std::uint32_t take(const UdpPeer&, JoinRole, const PairKeys&, std::int64_t) override { return 1; }
   } seats;
   PairingHost host(kCode);
-  PairingGuest guest(kCode, JoinRole::watcher);
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_EQ(guest.state(), PairingGuest::State::asking);
-    const std::int64_t now = i * 100'000;
-    Bytes ask = *guest.poll(now);
-    ask[5] ^= 1;
-    EXPECT_EQ(guest.answered(), i > 0);
-    guest.receive(*host.receive({}, ask, now, seats), now);
-    EXPECT_TRUE(guest.answered());
+  // 5: the last that does not know the action `simulate`, and would stand still at it.
+  for (const int other : {kTutorProtocol ^ 1, 5}) {
+    PairingGuest guest(kCode, JoinRole::watcher);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(guest.state(), PairingGuest::State::asking);
+      const std::int64_t now = i * 100'000;
+      Bytes ask = *guest.poll(now);
+      ask[5] = static_cast<std::uint8_t>(other);
+      EXPECT_EQ(guest.answered(), i > 0);
+      guest.receive(*host.receive({}, ask, now, seats), now);
+      EXPECT_TRUE(guest.answered());
+    }
+    EXPECT_EQ(guest.state(), PairingGuest::State::refused) << other;
+    EXPECT_NE(guest.why().find("another version"), std::string::npos);
   }
-  EXPECT_EQ(guest.state(), PairingGuest::State::refused);
-  EXPECT_NE(guest.why().find("another version"), std::string::npos);
   // A host of another version says so in its own, whose checksum is not known.
   PairingGuest older(kCode, JoinRole::watcher);
   Bytes ask = *older.poll(0);

@@ -231,37 +231,35 @@ void RehearsalWindow::look_at_settings() {
   switches_ = now;
   look_at_simulation();
   if (!main_view_.take_another_session()) return;
-  end_ = {true, actions_.folder(), true, scope_.view()};
+  end_ = {true, actions_.folder(), true, scope_.view(), values.dust, values.heat};
   quit_ = true;
 }
 
 void RehearsalWindow::look_at_simulation() {
-  Rehearsal& rehearsal = control_.rehearsal();
-  PersonValues& values = person_.values;
-  for (const Simulated what : {Simulated::dust, Simulated::heat}) {
-    const bool dust = what == Simulated::dust;
-    bool &wanted = dust ? values.dust : values.heat, &asked = simulated_[static_cast<std::size_t>(what)];
-    const bool changed = wanted != asked;
-    if (!actions_.simulate) {  // it is another's session, and as that person has it
-      if (changed)
-        control_.say([&] { return tr("dust, water and heat are switched where the session runs"); },
-                     Message::Rank::hindrance);
-      wanted = asked = rehearsal.simulates(what);
-    } else if (changed) {
-      actions_.simulate(what, wanted);
-      asked = wanted;
-      if (dust)
-        control_.say([&] { return wanted ? tr("bone dust and water from here on") : tr("no bone dust and no water"); });
-      else
-        control_.say([&] { return wanted ? tr("heat of drilling from here on") : tr("no heat of drilling"); });
-    }
+  const auto simulated = [&] {
+    Rehearsal& rehearsal = control_.rehearsal();
+    return SimulationSwitches::Both{rehearsal.simulates(Simulated::dust), rehearsal.simulates(Simulated::heat)};
+  };
+  if (!actions_.simulate) {
+    if (simulation_.follow(simulated()))
+      control_.say([&] { return tr("dust, water and heat are switched where the session runs"); },
+                   Message::Rank::hindrance);
+    return;
+  }
+  for (const auto& change : simulation_.take_changes()) {
+    const bool on = change.second;
+    actions_.simulate(change.first, on);
+    if (change.first == Simulated::dust)
+      control_.say([&] { return on ? tr("bone dust and water from here on") : tr("no bone dust and no water"); });
+    else
+      control_.say([&] { return on ? tr("heat of drilling from here on") : tr("no heat of drilling"); });
   }
 }
 
 void RehearsalWindow::use_water() {
   const bool suck = keyboard_.held(Command::suck) || main_view_.holds(Command::suck);
   const bool wash = keyboard_.held(Command::wash) || main_view_.holds(Command::wash);
-  if ((suck || wash) && main_view_.second_hand() && actions_.simulate) person_.values.dust = true;
+  if ((suck || wash) && main_view_.second_hand() && actions_.simulate) simulation_.use_water();
   control_.wash(suck, wash);
 }
 

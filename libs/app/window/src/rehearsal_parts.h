@@ -40,6 +40,7 @@
 #include "scene_painter.h"
 #include "scene_tools.h"
 #include "scope_input.h"
+#include "simulation_switches.h"
 #include "stereo_screen.h"
 #include "tool_touch.h"
 #include "trial_overlay.h"
@@ -180,8 +181,8 @@ class RehearsalWindow {
   ReviewScene review_;
   HintController hints_;
   PersonSettings& person_;
-  std::array<bool, 3> switches_{};   // sound, hints, monitor: as the session has them noted
-  std::array<bool, 2> simulated_{};  // by Simulated: as the session was asked to have it
+  std::array<bool, 3> switches_{};  // sound, hints, monitor: as the session has them noted
+  SimulationSwitches simulation_{person_.values};
   WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkSmartPointer<vtkRenderer> renderer_ = make_layered_renderer();

@@ -152,7 +152,7 @@ void RehearsalWindow::show_bone(Rehearsal& rehearsal) {
   rehearsal.add_counter(*work_);
   hints_.follow(rehearsal);
   switches_ = switches_now();
-  simulated_ = {rehearsal.simulates(Simulated::dust), rehearsal.simulates(Simulated::heat)};
+  simulation_.begin({rehearsal.simulates(Simulated::dust), rehearsal.simulates(Simulated::heat)});
   ended_.reset();
 }
 

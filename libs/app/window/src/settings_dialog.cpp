@@ -160,7 +160,7 @@ void choose_number(const SettingRow& row, const FieldDoc& doc, double& value) {
 }
 
 // To three figures, which are more than a hand feels.
-double rounded(double value) {
+double to_three_figures(double value) {
   if (value == 0 || !std::isfinite(value)) return value;
   const double last = std::pow(10, std::floor(std::log10(std::abs(value))) - 2);
   return std::round(value / last) * last;
@@ -183,7 +183,7 @@ bool draw_field(const FieldRef& f) {
   }
   double& value = **std::get_if<double*>(&f.target);
   if (!kit_root_slider(std::string(f.doc.name), figures(value), value, f.doc.lo, f.doc.hi)) return false;
-  value = std::clamp(rounded(value), f.doc.lo, f.doc.hi);
+  value = std::clamp(to_three_figures(value), f.doc.lo, f.doc.hi);
   return true;
 }
 

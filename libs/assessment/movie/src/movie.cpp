@@ -197,7 +197,7 @@ MovieFacts make_movie(const SessionReader& session, const World& begin, const An
     } else {
       report_recorded(session, begin, reader);
       facts.words.push_back(why + ": bone changes in steps of a tenth of a second" +
-                            (session.header().dust ? ", and dust lies a little elsewhere than it did" : ""));
+                            (survey.dust ? ", and dust lies a little elsewhere than it did" : ""));
     }
     reader.end();
   } catch (const Enough&) {  // the part that is shown is over

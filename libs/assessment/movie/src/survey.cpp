@@ -50,6 +50,7 @@ std::vector<std::pair<double, double>> shown_parts(const SessionSurvey& survey, 
 SessionSurvey survey_of(const SessionReader& session) {
   SessionSurvey s;
   s.rate_hz = session.header().rate_hz;
+  s.dust = session.header().dust;
   const double bin_ticks = std::max(1.0, kBinS * s.rate_hz);
   const auto bin_of = [&](std::uint64_t tick) {
     return static_cast<std::size_t>(static_cast<double>(tick) / bin_ticks);
@@ -65,6 +66,8 @@ SessionSurvey survey_of(const SessionReader& session) {
   while (const SessionPart* const p = parts.next()) {
     for (const SceneAction& a : p->actions) {
       if (!row_of(a).by_servo) stir(a.tick);
+      if (a.is(ActionKind::simulate) && a.item == static_cast<std::uint32_t>(Simulated::dust) && a.values[0] > 0)
+        s.dust = true;
     }
     for (const TickRecord& t : p->ticks) {
       s.end_tick = std::max(s.end_tick, t.tick + 1);

@@ -101,7 +101,7 @@ Bytes past_bytes(const SessionFolder& session) {
       throw Error(ExitCode::failed, "a session that this one goes on from lacks ticks", "begin with the case's bone");
     if (!writer) {
       SessionHeader header = reader.header();
-      header.dust = false;
+      header.dust = header.heat = false;
       writer.emplace(std::make_unique<MemorySink>(bytes), header);
     }
     std::uint64_t reached = 0;

@@ -145,6 +145,7 @@ std::shared_ptr<Rehearsal> LiveSeat::begin(const SessionHeader& header, World be
   options.haptics = header.haptics;
   options.rate_hz = header.rate_hz;
   options.follow.dust = header.dust;
+  options.follow.heat = header.heat;
   options.actions.clear();
   options.soft = nullptr;
   copy_ = std::make_unique<LiveCopy>(std::move(begin), options, context);

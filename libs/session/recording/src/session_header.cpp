@@ -267,6 +267,7 @@ std::string header_json(const SessionHeader& h) {
   j["rate_hz"] = h.rate_hz;
   j["hands"] = h.haptics.hands();
   j["dust"] = h.dust;
+  j["heat"] = h.heat;
   j["dust_model"] = h.dust_model;  // dust may begin later
   // Where an older session goes on under its own settings, it is reported by them.
   const int law = h.haptics.params.guard.law, contact = law == GuardParams{}.law ? h.kernels.contact : law + 1;
@@ -297,6 +298,7 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   h.bone_hash = j.at("bone_hash");
   h.rate_hz = j.at("rate_hz");
   h.dust = j.value("dust", false);
+  h.heat = j.value("heat", false);
   h.dust_model = j.value("dust_model", 1);
   if (!(h.rate_hz > 0)) throw Error(ExitCode::corrupt, name + " gives no rate");
   const auto& k = j.at("kernels");

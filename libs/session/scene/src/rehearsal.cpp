@@ -72,6 +72,7 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
     header.rate_hz = options_.rate_hz;
     header.haptics = options_.haptics;
     header.dust = options_.follow.dust;
+    header.heat = options_.follow.heat;
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);
   }
   keeper_.add(operation_.strokes(), false);

@@ -264,6 +264,7 @@ ReplayResult replay(const SessionReader& session, World start, const Anatomy& an
   const auto begin = std::chrono::steady_clock::now();
   check_same_case(session, start, anatomy);
   start.simulate(Simulated::dust, session.header().dust);
+  start.simulate(Simulated::heat, session.header().heat);
   Replaying again(session, std::move(start), anatomy, context, readers);
   auto parts = session.parts();
   while (const SessionPart* const part = parts.next()) again.take(*part);

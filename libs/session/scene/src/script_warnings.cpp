@@ -52,7 +52,7 @@ double nearest_mm(const Script& script, const Box& box, double times) {
 
 }  // namespace
 
-std::vector<std::string> warnings_about(const Script& script, const World& world, bool dust) {
+std::vector<std::string> warnings_about(const Script& script, const World& world, bool dust, bool laid) {
   std::vector<std::string> warnings;
   const Box box = box_of(world);
   const double near = nearest_mm(script, box, 1), size = length(box.hi - box.lo);
@@ -71,12 +71,15 @@ std::vector<std::string> warnings_about(const Script& script, const World& world
   }
   const auto cleans = [](const Script::TimedAction& d) { return row_of(d.action).moves_dust; };
   const auto begins = [](const Script::TimedAction& d) {
-    return d.action.is(ActionKind::simulate) && d.action.item == static_cast<std::uint32_t>(Simulated::dust);
+    return d.action.is(ActionKind::simulate) && d.action.item == static_cast<std::uint32_t>(Simulated::dust) &&
+           d.action.values[0] > 0;
   };
   dust = dust || std::any_of(script.actions.begin(), script.actions.end(), begins);
   if (!dust && std::any_of(script.actions.begin(), script.actions.end(), cleans))
     warnings.emplace_back(
         "the script sucks off dust, pours water or turns the patient, but there is no dust: add --dust");
+  if (!dust && laid)
+    warnings.emplace_back("how the patient lies moves dust and water alone, and there are none: add --dust");
   return warnings;
 }
 

@@ -155,6 +155,7 @@ struct WindowEnd {
   std::optional<std::filesystem::path> dropped = {};  ///< which, when it was dropped onto the window
   bool changed = false;  ///< that is the session itself, to continue with what was chosen in the settings meanwhile
   std::optional<ScopeView> view = {};  ///< and from where one looked then
+  bool dust = false, heat = false;     ///< and whether it had these
 };
 
 /// Begins a session in the window and runs until the person leaves it; the session that runs then is the caller's to

@@ -22,6 +22,7 @@ struct SessionSurvey {
       idle;  ///< by tenths of a second: no pedal down, nothing done, neither hand nor camera moved (2 mm/s)
   std::vector<std::pair<std::uint64_t, ScopeView>> views;  ///< of "camera" notes, each from its tick on
   std::size_t unreadable_views = 0;
+  bool dust = false;                                ///< some of it has any
   std::optional<std::pair<Vec3, Vec3>> drilled_mm;  ///< box of the burrs' places while they removed bone
   Vec3 handle;  ///< unit, from there to the hand, on the average; zero where nothing was drilled
   [[nodiscard]] double seconds() const { return static_cast<double>(end_tick) / rate_hz; }

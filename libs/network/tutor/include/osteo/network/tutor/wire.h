@@ -13,7 +13,7 @@
 namespace osteo::inline network {
 
 /// Raised when a packet means something else: others are not understood, and say so.
-inline constexpr std::uint8_t kTutorProtocol = 5;
+inline constexpr std::uint8_t kTutorProtocol = 6;
 /// With what encryption adds it stays under the usual 1280 bytes of a path.
 inline constexpr std::size_t kMaxPacketBytes = 1200;
 using Bytes = std::vector<std::uint8_t>;

@@ -29,7 +29,8 @@ struct SessionHeader {
   double rate_hz = 1000;
   Kernels kernels;
   HapticSetup haptics;          ///< of how many hands, too: each tick has a record for each, in their order
-  bool dust = false;            ///< the scene has bone dust
+  bool dust = false;            ///< the scene begins with bone dust
+  bool heat = false;            ///< it begins with heat
   int dust_model = kDustModel;  ///< which its hash is of: a replay compares its own model's only
 };
 

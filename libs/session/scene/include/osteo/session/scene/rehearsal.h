@@ -264,8 +264,9 @@ void apply_recorded(const SessionReader& session, World& world);
 std::uint64_t apply_recorded_until(const SessionReader& session, World& world, std::uint64_t tick);
 
 /// What speaks against a script for this scene, each in a sentence: strokes that stay far from bone, points that look
-/// like metres, a sucker or water where there is no dust.
-[[nodiscard]] std::vector<std::string> warnings_about(const Script& script, const World& world, bool dust);
+/// like metres, a sucker or water where there is no dust. `laid`: the patient is laid otherwise than supine before it.
+[[nodiscard]] std::vector<std::string> warnings_about(const Script& script, const World& world, bool dust,
+                                                      bool laid = false);
 
 /// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or
 /// right) until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.
