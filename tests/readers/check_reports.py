@@ -172,6 +172,21 @@ assert json.loads((work / "s1/session.json").read_text())["approval"]["state"] =
 osteo("report", "case", env=no_memory)
 assert html_file.read_bytes() == signed
 
+# What came of surgery later has a page of its own, and leaves the approval as it is.
+outcome = work / "case/outcome.json"
+outcome.write_text('{"osteotome_outcome": 1, "fragments": [{"name": "the back", "reference": true}]}')
+assert "earlier state" in osteo("info", "case")[0]
+osteo("report", "case", env=no_memory)
+later = osteo("info", "case")[0]
+assert "approved by" in later and "no longer valid" not in later and "earlier state" not in later, later
+page = page_of(html_file)
+assert "the back" in page.texts and wanted <= set(page.pictures), page.texts
+if poppler:
+    assert "the back" in pdf_text() and "3/3" in pdf_text().replace(" / ", "/"), pdf_text()
+outcome.unlink()
+osteo("report", "case", env=no_memory)
+assert html_file.read_bytes() == signed
+
 # A report changed by hand; then a case changed by prepare.
 html_file.write_bytes(signed.replace(b"voxels across", b"voxels acros!"))
 assert "the report" in osteo("info", "case")[0].split("Verdict")[0]

@@ -59,6 +59,37 @@ TEST(OutcomeContour, OfWhatLiesAsPlannedIsNothing) {
   EXPECT_NEAR(o.contours[1].mean_mm.value, o.contours[1].planned_mean_mm, 0.05);
 }
 
+// A plan whose target is the bone itself, and whose lower border lies elsewhere, is held against that.
+TEST(OutcomeContour, OfWhatThePlanFollows) {
+  const Truth t = surgery(world(), world().rebuilt, 0, 0, 11);
+  SurgicalPlan own = world().rebuilt;
+  own.target = ReconstructionTarget::own;
+  own.down = normalized({0.2, -0.3, -1});
+  ReconstructionParams r = test::params_for(world().phantom);
+  r.target = own.target;
+  r.down = {own.down.x, own.down.y, own.down.z};
+  const Reconstruction followed = reconstruct(world().phantom.jaw, world().phantom.donor, r);
+  EXPECT_EQ(followed.plan.target, own.target);
+  EXPECT_LT(length(followed.plan.down - own.down), 1e-12);
+  const auto mean = [&](const std::vector<Vec3>& contour) {
+    double sum = 0;
+    for (const Vec3& q : contour) {
+      double nearest = 1e9;
+      for (std::size_t k = 0; k + 1 < world().axis_mm.size(); ++k) {
+        const Vec3 a = world().axis_mm[k], d = world().axis_mm[k + 1] - a;
+        nearest = std::min(nearest, length(q - a - d * std::clamp(dot(q - a, d) / dot(d, d), 0.0, 1.0)));
+      }
+      sum += nearest / static_cast<double>(contour.size());
+    }
+    return sum;
+  };
+  ASSERT_GT(std::abs(mean(followed.contour_mm) - mean(world().contour_mm)), 0.1) << "as near to both: tells nothing";
+  const Outcome o = measured(own, t, 11);
+  EXPECT_EQ(o.contours[1].against, "bone's own outline");
+  ASSERT_TRUE(o.contours[1].known) << o.contours[1].why;
+  EXPECT_NEAR(o.contours[1].planned_mean_mm, mean(followed.contour_mm), 0.03);
+}
+
 TEST(OutcomeContour, CondylesAreAtTheJawsEnds) {
   const Truth t = surgery(world(), world().advanced, 1.5, 3, 12);
   const Outcome o = measured(world().advanced, t, 12);

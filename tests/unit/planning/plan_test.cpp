@@ -47,11 +47,21 @@ TEST(Plan, ThereAndBackToTheBit) {
     EXPECT_EQ(back.fragments[n].planned_from_ct.shift_mm, plan.fragments[n].planned_from_ct.shift_mm);
   }
   EXPECT_EQ(plan_json(back), text);
+  EXPECT_EQ(text.find("target"), std::string::npos);  // as files had it before there were others
+  EXPECT_EQ(text.find("down"), std::string::npos);
+  SurgicalPlan own = plan;
+  own.target = ReconstructionTarget::own;
+  own.down = normalized({0.1, -0.2, -1});
+  const SurgicalPlan read = plan_of(plan_json(own), "p.json");
+  EXPECT_EQ(read.target, own.target);
+  EXPECT_EQ(read.down, own.down);
   EXPECT_EQ(back.plane("b").bone, "fibula");
   EXPECT_THROW(static_cast<void>(back.plane("c")), Error);
 }
 
 TEST(Plan, WhatIsWrongIsNamed) {
+  expect_error(with("\"unit\"", "\"target\": \"other\", \"unit\""), "target");
+  expect_error(with("\"unit\"", "\"down\": [0, 0, -2], \"unit\""), "down");
   expect_error(with("\"mm\"", "\"cm\""), "unit");
   expect_error(with("osteotome_surgical_plan\": 1", "osteotome_surgical_plan\": 2"), "osteotome_surgical_plan");
   expect_error(with("\"waste_ahead\": true", "\"waste_ahead\": 1"), "waste_ahead");

@@ -179,6 +179,14 @@ TEST(Sheet, ASignatureChangesNothingElse) {
       sheet::Signature{"A. Łukasiewicz", "2031-02-03", std::string(300, 'w') + " long", "approved", Tone::good}};
   EXPECT_NE(sheet_html(open), sheet_html(closed));
   EXPECT_EQ(html_without_signature(sheet_html(open)), html_without_signature(sheet_html(closed)));
+  // What comes to a signed page later has a page of its own, and leaves what was signed as large as it was.
+  closed.after = {{sheet::Heading{"Later"}}, {sheet::Paragraph{std::string(9000, 'l')}}};
+  closed.marks["after"] = "of this";
+  const std::string more = sheet_html(closed);
+  EXPECT_NE(more.find("Later"), std::string::npos);
+  EXPECT_EQ(mark_of_html(more, "after"), "of this");
+  EXPECT_EQ(html_without_signature(sheet_html(open)), html_without_signature(more));
+  EXPECT_GT(pages(sheet_pdf(closed)), pages(sheet_pdf(open)));
   closed.footer += ".";
   EXPECT_NE(html_without_signature(sheet_html(open)), html_without_signature(sheet_html(closed)));
 }

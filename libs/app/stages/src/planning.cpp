@@ -14,7 +14,7 @@ namespace osteo::inline app {
 StageInfo PlanReconstructionStage::info() {
   return {
       .name = "plan-reconstruction",
-      .version = 1,
+      .version = 2,
       .synopsis = "a resected mandible rebuilt from segments of a fibula",
       .description =
           "From two resection planes: how many straight segments, how long, where the fibula is sawn and where each "
@@ -191,13 +191,13 @@ std::vector<Data> CuttingGuideStage::run(const Params& params, std::span<const D
 StageInfo OutcomeStage::info() {
   return {
       .name = "outcome",
-      .version = 1,
+      .version = 2,
       .synopsis =
           "what came of a plan: fragments, cuts, contour, condyles, screws and plates in a CT after surgery, "
           "with intervals",
       .description =
           "Finds each fragment of a plan in a CT after surgery by the edges of its surface, and each cut face where "
-          "the CT shows it. The contour is compared with the plan and with the mirrored side, each condyle with where "
+          "the CT shows it. The contour is compared with the plan and with the plan's target, each condyle with where "
           "the "
           "plan has it. Screws and empty holes of the plan are compared within their fragment, a plate with each "
           "fragment that it lies on. Deviations are from the plan, with the largest fragment that stays as the "
@@ -433,11 +433,12 @@ std::string outcome_page(const Outcome& o) {
   }
   sheet::Table cuts{{"Cut", "off the plan (mm)", "tilt (degrees)"}, {}, {0.3, 0.35, 0.35}};
   for (const CutOutcome& c : o.cuts) {
+    const std::string name = c.plane + " (" + c.fragment + ")";
     if (c.known)
       cuts.rows.push_back(
-          {cell(c.plane), cell(text_of(c.off_mm)), cell(text_of(c.tilt_deg[0]) + "; " + text_of(c.tilt_deg[1]))});
+          {cell(name), cell(text_of(c.off_mm)), cell(text_of(c.tilt_deg[0]) + "; " + text_of(c.tilt_deg[1]))});
     else
-      cuts.rows.push_back({cell(c.plane), cell("not known: " + c.why, Tone::caution), cell("")});
+      cuts.rows.push_back({cell(name), cell("not known: " + c.why, Tone::caution), cell("")});
   }
   s.blocks.push_back({sheet::Paragraph{
       "Value and half-width of the 95 % interval. x: to the patient's left, y: to the back, z: to the head. A cut is "
@@ -452,8 +453,8 @@ std::string outcome_page(const Outcome& o) {
   s.blocks.push_back({contours_table(o.contours)});
   s.blocks.push_back({sheet::Paragraph{
       "How far the surface of what the plan moves is from where the plan has it; how far the lower border of the "
-      "mirrored side is from the axes of the segments that rebuild it. A mirrored side is no truth of how the bone "
-      "was."}});
+      "plan's target, the mirrored side or the bone's own outline, is from the axes of the segments that rebuild it. A "
+      "mirrored side is no truth of how the bone was."}});
   s.blocks.push_back({sheet::Heading{"Condyles"}});
   s.blocks.push_back({condyles_table(o.condyles)});
   if (!o.screws.empty()) {

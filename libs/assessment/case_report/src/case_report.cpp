@@ -315,10 +315,10 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
   add_threshold_and_removed(s, c);
   add_thin_bone_and_resolution(s, c);
   add_structures(s, c);
-  if (const std::string outcome = outcome_of(folder); !outcome.empty())
-    for (SheetBlock& block : outcome_blocks(outcome)) s.blocks.push_back(std::move(block));
   add_how_made(s, folder, c, asked_for, left_out);
   s.blocks.push_back({signature_of(folder)});
+  // Surgery comes after a plan was approved, so what came of it must not end the approval.
+  if (const std::string outcome = outcome_of(folder); !outcome.empty()) s.after = outcome_blocks(outcome);
   return s;
 }
 
@@ -383,7 +383,7 @@ std::vector<std::pair<std::string, std::string>> case_facts(const fs::path& fold
 bool report_shows(const fs::path& folder) {
   const std::string html = earlier_html(folder);
   return !html.empty() && mark_of_html(html, "state") == state_of(folder) &&
-         mark_of_html(html, "outcome") == outcome_mark(folder);
+         mark_of_html(html, "after") == outcome_mark(folder);
 }
 
 bool has_full_report(const fs::path& folder) {
@@ -425,7 +425,7 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
   s.marks["state"] = state;
   if (language() != Language::english)
     s.marks["language"] = enum_names(Language{})[static_cast<std::size_t>(language())];
-  if (const std::string mark = outcome_mark(folder); !mark.empty()) s.marks["outcome"] = mark;
+  if (const std::string mark = outcome_mark(folder); !mark.empty()) s.marks["after"] = mark;
   s.marks["left-out"] = report.left_out.empty() ? "" : "scan";
   if (c.thin_percent >= 0) s.marks["thin-percent"] = format_number(std::round(100 * c.thin_percent) / 100);
   context.progress(0.9, "report: pages");

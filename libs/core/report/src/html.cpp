@@ -15,6 +15,8 @@ namespace {
 using namespace report;
 
 constexpr std::string_view kSignatureBegin = "<!--signature-->", kSignatureEnd = "<!--/signature-->";
+constexpr std::string_view kAfterBegin = "<!--after-->", kAfterEnd = "<!--/after-->\n";
+constexpr std::string_view kAfterMark = "<meta name=\"osteotome-after\"", kMarkEnd = ">\n";
 
 constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
@@ -355,14 +357,25 @@ std::string sheet_html(const Sheet& s) {
       << style_of(scale) << "</style></head>\n<body>\n<header><h1>" << escaped(s.title) << "</h1><b>" << escaped(s.code)
       << "</b></header>\n";
   write(out, s.blocks, scale, kPageWidth - 2 * kMargin);
+  if (!s.after.empty()) {
+    out << kAfterBegin;
+    write(out, {{sheet::PageBreak{}}}, scale, kPageWidth - 2 * kMargin);
+    write(out, s.after, scale, kPageWidth - 2 * kMargin);
+    out << kAfterEnd;
+  }
   out << "<footer>" << escaped(s.footer) << "</footer>\n</body></html>\n";
   return std::move(out).str();
 }
 
 std::string html_without_signature(std::string_view html) {
-  const auto begin = html.find(kSignatureBegin), end = html.find(kSignatureEnd);
-  if (begin == std::string_view::npos || end == std::string_view::npos || end < begin) return std::string(html);
-  return std::string(html.substr(0, begin)) + std::string(html.substr(end));
+  std::string rest(html);
+  const auto begin = rest.find(kSignatureBegin), end = rest.find(kSignatureEnd);
+  if (begin != std::string::npos && end != std::string::npos && end >= begin) rest.erase(begin, end - begin);
+  for (const auto& [from, to] : {std::pair{kAfterBegin, kAfterEnd}, std::pair{kAfterMark, kMarkEnd}}) {
+    const auto at = rest.find(from), until = at == std::string::npos ? at : rest.find(to, at);
+    if (until != std::string::npos) rest.erase(at, until + to.size() - at);
+  }
+  return rest;
 }
 
 std::map<std::string, Picture> pictures_of_html(std::string_view html) {

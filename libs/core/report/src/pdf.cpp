@@ -393,11 +393,14 @@ struct Unit {
   bool begins_table = false, ends_table = false;  // a table's rows are units of their own, but one table
 };
 
-std::vector<Unit> units_of(const Sheet& s) {
-  std::vector<Unit> units;
-  for (const SheetBlock& block : s.blocks) {
+Unit new_page() {
+  return {[](const Pen&, double, double, double) { return 0.0; }, false, true, 0};
+}
+
+void add_units(std::vector<Unit>& units, const SheetBlocks& blocks) {
+  for (const SheetBlock& block : blocks) {
     if (std::holds_alternative<sheet::PageBreak>(block.is)) {
-      units.push_back({[](const Pen&, double, double, double) { return 0.0; }, false, true, 0});
+      units.push_back(new_page());
     } else if (const auto* t = std::get_if<sheet::Table>(&block.is); t != nullptr && t->rows.size() > 3) {
       if (!t->head.empty())
         units.push_back(
@@ -415,11 +418,10 @@ std::vector<Unit> units_of(const Sheet& s) {
                        std::holds_alternative<sheet::Heading>(block.is)});
     }
   }
-  return units;
 }
 
 // Goes over all pages; returns how many. `total`: to show, 0 while they are counted. `shown`: by each figure.
-int go(cairo_t* cairo, const Sheet& s, double scale, int total, std::vector<std::string>& shown) {
+int go(cairo_t* cairo, const Sheet& s, double scale, int total, bool with_after, std::vector<std::string>& shown) {
   const double width = (kPageWidth - 2 * kMargin) * kMm / scale, left = kMargin * kMm / scale,
                top = kMargin * kMm / scale;
   const double bottom = (kPageHeight - kMargin - kFoot) * kMm / scale;
@@ -454,7 +456,12 @@ int go(cairo_t* cairo, const Sheet& s, double scale, int total, std::vector<std:
   if (scale != 1) cairo_scale(cairo, scale, scale);
   pen.begin("Document");
   begin_page();
-  const auto units = units_of(s);
+  std::vector<Unit> units;
+  add_units(units, s.blocks);
+  if (with_after && !s.after.empty()) {
+    units.push_back(new_page());
+    add_units(units, s.after);
+  }
   double first = y;
   for (std::size_t u = 0; u < units.size(); ++u) {
     double need = measure.on ? 0 : units[u].draw(measure, left, y, width);
@@ -511,7 +518,7 @@ double fitting_scale(const Sheet& s) {
   for (double scale = 1; scale > kSmallest + 0.01; scale -= 0.03) {
     Paper paper;
     std::vector<std::string> none;
-    if (go(paper.cairo.get(), s, scale, 0, none) <= s.pages) return scale;
+    if (go(paper.cairo.get(), s, scale, 0, false, none) <= s.pages) return scale;
   }
   return 0.85;  // longer then, but readable
 }
@@ -526,7 +533,7 @@ std::string sheet_pdf(const Sheet& s) {
   int pages = 0;
   {
     Paper counted;
-    pages = go(counted.cairo.get(), s, scale, 0, shown);
+    pages = go(counted.cairo.get(), s, scale, 0, true, shown);
   }
   Paper paper;
   // Later versions may pack the dictionaries that `describe` adds to.
@@ -535,7 +542,7 @@ std::string sheet_pdf(const Sheet& s) {
                                  valid_utf8(s.title + " " + s.code).c_str());
   cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_CREATOR, "Osteotome");
   cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "2000-01-01T00:00:00Z");
-  go(paper.cairo.get(), s, scale, pages, shown);
+  go(paper.cairo.get(), s, scale, pages, true, shown);
   cairo_surface_finish(paper.surface.get());
   const cairo_status_t status = cairo_surface_status(paper.surface.get());
   if (status != CAIRO_STATUS_SUCCESS)

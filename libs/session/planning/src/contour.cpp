@@ -7,6 +7,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/portable_math.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline session::planning {
 namespace {
@@ -50,7 +51,7 @@ std::vector<Vec3> contour_of(const TriangleSoup& target, const Plane& a, const P
   Loop loop = outline(sheet, a.at);
   std::vector<Vec3> middles{sheet.world(moments(loop).centroid)};
   if (b.ahead(middles[0]) <= 0 || a.ahead(b.at) <= 0)
-    throw Error(ExitCode::usage, "the resection planes do not face each other",
+    throw Error(ExitCode::usage, tr_later("the resection planes do not face each other"),
                 "each normal points to the part that is removed, which lies between them");
   out.push_back(border_middle(sheet, loop, down, thickness));
   Vec3 heading = a.normal;
@@ -70,7 +71,7 @@ std::vector<Vec3> contour_of(const TriangleSoup& target, const Plane& a, const P
     if (a.ahead(middle) > 0 && b.ahead(middle) > 0) out.push_back(middle);
     heading = normalized(middles.back() - middles[middles.size() - std::min<std::size_t>(middles.size(), 5)]);
   }
-  throw Error(ExitCode::usage, "from resection plane a the bone does not lead to plane b within 300 mm",
+  throw Error(ExitCode::usage, tr_later("from resection plane a the bone does not lead to plane b within 300 mm"),
               "each normal points to the part that is removed, which lies between them");
 }
 

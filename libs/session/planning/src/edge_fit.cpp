@@ -184,7 +184,7 @@ std::optional<EdgeReader::Edge> EdgeReader::along(Vec3 point, Vec3 direction, do
   double most = min_drop_;
   for (int k = -reach; k <= reach; ++k) {
     const double d = drop(k);
-    if (d <= most) continue;
+    if (!(d > most)) continue;
     most = d;
     best = k;
   }

@@ -9,6 +9,7 @@
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/portable_math.h"
+#include "osteo/core/base/translate.h"
 #include "outcome_parts.h"
 #include "section.h"
 
@@ -213,15 +214,15 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
     if (metal && by_metal(p)) continue;
     const Vec3 place = fit.pose(sheet.world(p));
     const auto edge = ct.along(place, fit.pose.rotation * e, kFaceReachMm);
-    if (!edge || edge->drop_hu < kFaceDropShare * fit.drop || edge->rise_hu > kRiseShare * edge->drop_hu ||
-        edge->beyond_hu > fit.beyond + kBrighterHu)
+    if (!(edge && edge->drop_hu >= kFaceDropShare * fit.drop && edge->rise_hu <= kRiseShare * edge->drop_hu &&
+          edge->beyond_hu <= fit.beyond + kBrighterHu))
       continue;
     seen.push_back({p, edge->at_mm - pulled_share * edge->pulled * fit.blur - fit.offset});
     drops.push_back(edge->drop_hu);
   }
   out.seen = places.empty() ? 0 : static_cast<double>(seen.size()) / static_cast<double>(places.size());
   if (places.size() < 30 || out.seen < kMinFaceSeen) {
-    out.why = "the CT shows too little of an edge there: the face lies upon other bone, is healed or covered";
+    out.why = tr_later("the CT shows too little of an edge there: the face lies upon other bone, is healed or covered");
     return out;
   }
   const double dense = kDenseShare * quantile_of(drops, 0.9);
@@ -261,7 +262,7 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
     for (std::size_t k = 0; k < 3; ++k) plane_fit[k] += solved->step[k];
   }
   if (!solved) {
-    out.why = "too little of the face is seen";
+    out.why = tr_later("too little of the face is seen");
     return out;
   }
   // The pose's own error moves the planned face under the edges: along its normal, and by turning it.
@@ -285,7 +286,7 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
   out.angle_deg = portable::atan2(portable::hypot(plane_fit[1], plane_fit[2]), 1) / kDeg;
   out.known = out.off_mm.half <= params.max_unsure_mm && out.tilt_deg[0].half <= params.max_unsure_deg &&
               out.tilt_deg[1].half <= params.max_unsure_deg;
-  if (!out.known) out.why = "the interval is wider than what is accepted";
+  if (!out.known) out.why = tr_later("the interval is wider than what is accepted");
   return out;
 }
 
@@ -340,12 +341,12 @@ Outcome measure_outcome(const SurgicalPlan& plan, const std::vector<std::pair<st
     if (!o.reference)
       fits[n] = outcome::located(ct, places[n], fits[reference]->pose * f.planned_from_ct, {4, 2, 6, 4}, context);
     if (!fits[n] || fits[n]->found < outcome::kMinFound) {
-      o.why = "the CT does not show enough of its surface where it should be";
+      o.why = tr_later("the CT does not show enough of its surface where it should be");
       for (const std::string& p : f.planes) {
         CutOutcome& c = out.cuts.emplace_back();
         c.plane = p;
         c.fragment = f.name;
-        c.why = "its fragment is not found";
+        c.why = tr_later("its fragment is not found");
       }
       continue;
     }
@@ -358,7 +359,7 @@ Outcome measure_outcome(const SurgicalPlan& plan, const std::vector<std::pair<st
       out.cuts.push_back(outcome::cut_of(*p, f.name, outcome::bone_called(bones, f.bone), *fits[n], ct, params));
       CutOutcome& c = out.cuts.back();
       if (!c.known && c.off_mm.half > params.max_unsure_mm && !(o.slides_along == Vec3{}))
-        c.why = "the fragment's surface does not show where along itself it lies, so not where it was cut";
+        c.why = tr_later("the fragment's surface does not show where along itself it lies, so not where it was cut");
     }
   }
   outcome::find_contours(out, plan, bones, fits, places, reference, params, context);

@@ -14,6 +14,7 @@
 #include "contour.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/geometry/distance/triangle_tree.h"
 #include "osteo/session/planning/detail/reconstruct.h"
 #include "osteo/session/planning/detail/symmetry.h"
@@ -155,7 +156,7 @@ void fill(ContourOutcome& out, const std::vector<Place>& places, std::size_t ref
   out.mean_mm = interval(measured.mean, mean);
   out.p95_mm = interval(measured.p95, p95);
   out.known = out.mean_mm.half <= params.max_unsure_mm && out.p95_mm.half <= params.max_unsure_mm;
-  if (!out.known) out.why = "the interval is wider than what is accepted";
+  if (!out.known) out.why = tr_later("the interval is wider than what is accepted");
 }
 
 // Of the surface of each fragment that the plan moves, to the surface of its bone where the plan has it: all of the
@@ -173,7 +174,7 @@ ContourOutcome against_plan(const SurgicalPlan& plan, const Bones& bones, const 
     area += places[n].front().mm2 * static_cast<double>(places[n].size());
     if (!found(fits[n]) && out.why.empty()) out.why = "'" + plan.fragments[n].name + "' is not found";
   }
-  if (moved.empty()) out.why = "the plan moves no fragment";
+  if (moved.empty()) out.why = tr_later("the plan moves no fragment");
   if (!out.why.empty()) return out;
   std::vector<Place> all;
   for (const std::size_t n : moved) {
@@ -210,13 +211,14 @@ struct Axis {
   }
 };
 
-// From places on the mirrored side's lower border to the axes of the segments, as the plan's own contour error; to the
-// line of the segment that is planned there, so that where a shaft lies along itself makes no difference.
-ContourOutcome against_mirrored(const SurgicalPlan& plan, const Bones& bones, const Fits& fits, std::size_t reference,
-                                const std::optional<SymmetryPlane>& symmetry, const std::string& why_not,
-                                const Draws& draws, const OutcomeParams& params, const Context& context) {
+// From places on the target's lower border to the axes of the segments, as the plan's own contour error; to the line of
+// the segment that is planned there, so that where a shaft lies along itself makes no difference.
+ContourOutcome against_target(const SurgicalPlan& plan, const Bones& bones, const Fits& fits, std::size_t reference,
+                              const std::optional<SymmetryPlane>& symmetry, const std::string& why_not,
+                              const Draws& draws, const OutcomeParams& params, const Context& context) {
   ContourOutcome out;
-  out.against = "mirrored side";
+  const bool mirrored_target = plan.target == ReconstructionTarget::mirrored;
+  out.against = mirrored_target ? "mirrored side" : "bone's own outline";
   const std::string& jaw = plan.planes.front().bone;
   std::vector<Plane> resection;
   for (const CutPlane& p : plan.planes)
@@ -225,10 +227,10 @@ ContourOutcome against_mirrored(const SurgicalPlan& plan, const Bones& bones, co
   for (std::size_t n = 0; n < fits.size(); ++n)
     if (plan.fragments[n].bone != jaw && plan.fragments[n].planes.size() == 2) segments.push_back(n);
   if (resection.size() != 2 || segments.empty()) {
-    out.why = "the plan does not rebuild what lies between two planes from segments of another bone";
+    out.why = tr_later("the plan does not rebuild what lies between two planes from segments of another bone");
     return out;
   }
-  if (!symmetry) {
+  if (mirrored_target && !symmetry) {
     out.why = why_not;
     return out;
   }
@@ -237,8 +239,9 @@ ContourOutcome against_mirrored(const SurgicalPlan& plan, const Bones& bones, co
   const RigidTransform back = fits[reference]->pose.inverse();
   try {
     const TriangleSoup& donor = bone_called(bones, plan.fragments[segments.front()].bone);
-    contour = planning::contour_of(mirrored(bone_called(bones, jaw), *symmetry), resection[0], resection[1],
-                                   Vec3{0, 0, -1}, donor_thickness_mm(donor));
+    const TriangleSoup& own = bone_called(bones, jaw);
+    contour = planning::contour_of(mirrored_target ? mirrored(own, *symmetry) : own, resection[0], resection[1],
+                                   plan.down, donor_thickness_mm(donor));
     for (const std::size_t n : segments) {
       const PlannedFragment& f = plan.fragments[n];
       if (!found(fits[n])) {
@@ -338,7 +341,7 @@ void find_contours(Outcome& out, const SurgicalPlan& plan,
   }
   const Draws draws(fits);
   out.contours.push_back(against_plan(plan, bones, fits, places, reference, draws, params, context));
-  out.contours.push_back(against_mirrored(plan, bones, fits, reference, symmetry, why_not, draws, params, context));
+  out.contours.push_back(against_target(plan, bones, fits, reference, symmetry, why_not, draws, params, context));
 
   const BoxMm box = bounds_of(jaw);
   const SymmetryPlane middle = symmetry.value_or(SymmetryPlane{(box.lo + box.hi) / 2, {1, 0, 0}, 0, 0});
@@ -361,7 +364,7 @@ void find_contours(Outcome& out, const SurgicalPlan& plan,
       }
     }
     if (of == fits.size()) {
-      c.pose.why = "no fragment of the plan holds it";
+      c.pose.why = tr_later("no fragment of the plan holds it");
       continue;
     }
     const PlannedFragment& f = plan.fragments[of];
@@ -369,11 +372,11 @@ void find_contours(Outcome& out, const SurgicalPlan& plan,
     c.pose.middle_mm = f.planned_from_ct(*at);
     if (of == reference) {
       c.pose.reference = true;
-      c.pose.why = "it is a part of the reference, which the others are held against";
+      c.pose.why = tr_later("it is a part of the reference, which the others are held against");
       continue;
     }
     if (!found(fits[of])) {
-      c.pose.why = "its fragment is not found";
+      c.pose.why = tr_later("its fragment is not found");
       continue;
     }
     c.pose.found = fits[of]->found;

@@ -9,6 +9,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/portable_math.h"
+#include "osteo/core/base/translate.h"
 #include "solve.h"
 
 namespace osteo::inline session::outcome {
@@ -231,7 +232,7 @@ void judge(FragmentOutcome& out, const OutcomeParams& params) {
   for (std::size_t k = 0; k < 3; ++k)
     out.known =
         out.known && out.shift_mm[k].half <= params.max_unsure_mm && out.turn_deg[k].half <= params.max_unsure_deg;
-  if (!out.known) out.why = "the interval is wider than what is accepted";
+  if (!out.known) out.why = tr_later("the interval is wider than what is accepted");
 }
 
 }  // namespace osteo::inline session::outcome

@@ -12,6 +12,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/portable_math.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/geometry/distance/distance_map.h"
 #include "outcome_metal.h"
 #include "outcome_parts.h"
@@ -143,11 +144,11 @@ class Finder {
     }
     const auto count = static_cast<double>(places.size());
     if (inside < 0.7 * count) {
-      why = "it lies outside the CT's field of view";
+      why = tr_later("it lies outside the CT's field of view");
       return std::nullopt;
     }
     if (metal < 0.5 * count) {
-      why = "there is no metal where the plan has it";
+      why = tr_later("there is no metal where the plan has it");
       return std::nullopt;
     }
     const PlateField field(plate.surface, blur, context_);
@@ -157,16 +158,16 @@ class Finder {
       if (fit && (!best || fit->fits * fit->fit.found > best->fits * best->fit.found)) best = std::move(fit);
     }
     if (!best) {
-      if (why.empty()) why = "the metal there is not shaped as the planned plate";
+      if (why.empty()) why = tr_later("the metal there is not shaped as the planned plate");
       return std::nullopt;
     }
     const RigidTransform moved = best->fit.pose * guess.inverse();
     if (best->fits < kMinFits) {
-      why = "the metal there is not shaped as the planned plate";
+      why = tr_later("the metal there is not shaped as the planned plate");
       return std::nullopt;
     }
     if (length(moved(best->fit.middle) - best->fit.middle) > 2 * kSearchMm) {
-      why = "there is no metal where the plan has it";
+      why = tr_later("there is no metal where the plan has it");
       return std::nullopt;
     }
     why.clear();
@@ -245,7 +246,7 @@ class Finder {
       context_.check_cancelled();
       const auto all = sites(field, fit.pose, surface, blur, fit.found);
       if (fit.found < kMinSeen || all.size() < 100) {
-        why = "other metal merges with it, or too little of it is seen";
+        why = tr_later("other metal merges with it, or too little of it is seen");
         return std::nullopt;
       }
       fit.middle = {};
@@ -289,7 +290,7 @@ class Finder {
       towards[7] = as_bone - mix;
       const auto solved = planning::least_squares<8>(equations, hold, towards);
       if (!solved) {
-        why = "too little of it is seen";
+        why = tr_later("too little of it is seen");
         return std::nullopt;
       }
       const auto& s = solved->step;
@@ -389,7 +390,7 @@ void find_plates(Outcome& out, const SurgicalPlan& plan, const std::vector<std::
     const BoxMm box = bounds_of(plate.surface);
     std::optional<Fit> fit;
     if (length(box.hi - box.lo) < kShortestPlateMm)
-      why = "this piece of the surface is too small for a plate";
+      why = tr_later("this piece of the surface is too small for a plate");
     else
       fit = finder.find(plate, base.pose, blur_of(base), why);
     const auto on = spread(plate.surface, {});
@@ -416,7 +417,7 @@ void find_plates(Outcome& out, const SurgicalPlan& plan, const std::vector<std::
       o.pose.found = fit->found;
       o.pose.postop_from_ct = fit->pose;
       if (!fits[n] || fits[n]->found < kMinFound) {
-        o.pose.why = "that fragment is not found";
+        o.pose.why = tr_later("that fragment is not found");
         continue;
       }
       Fit of = *fits[n];

@@ -14,7 +14,8 @@ namespace osteo::inline session {
 namespace {
 
 constexpr double kUnitTolerance = 1e-9, kMaxMm = 10000, kMaxKerfMm = 10;
-const std::vector<std::string> kRootKeys{"osteotome_surgical_plan", "unit", "planes", "fragments", "screws"};
+const std::vector<std::string> kRootKeys{
+    "osteotome_surgical_plan", "unit", "planes", "fragments", "screws", "target", "down"};
 const std::vector<std::string> kPlaneKeys{"name", "bone", "at_mm", "normal", "kerf_mm", "waste_ahead"};
 const std::vector<std::string> kFragmentKeys{"name", "bone", "planes", "rotation_rows", "shift_mm"};
 const std::vector<std::string> kScrewKeys{"name", "fragment", "entry_mm", "tip_mm", "diameter_mm", "empty"};
@@ -40,9 +41,7 @@ class PlanReader {
       p.bone = name_of(v, where, "bone");
       p.at_mm = triple(file_.need(v, where, "at_mm"), where + " \"at_mm\"", kMaxMm);
       const JsonValue& normal = file_.need(v, where, "normal");
-      p.normal = triple(normal, where + " \"normal\"", 2);
-      if (std::abs(length(p.normal) - 1) > kUnitTolerance)
-        throw file_.wrong(normal, where + ": \"normal\" is not of length 1", "divide it by its length");
+      p.normal = direction(normal, where + ": \"normal\"");
       p.kerf_mm = file_.number(file_.need(v, where, "kerf_mm"), where + " \"kerf_mm\"", 0, kMaxKerfMm);
       const JsonValue& ahead = file_.need(v, where, "waste_ahead");
       if (ahead.kind != JsonValue::Kind::flag)
@@ -54,6 +53,13 @@ class PlanReader {
       plan.fragments.push_back(fragment(v, plan));
     if (const JsonValue* screws = root.find("screws"))
       for (const JsonValue& v : file_.list(*screws, "\"screws\"")) plan.screws.push_back(screw(v, plan));
+    if (const JsonValue* target = root.find("target")) {
+      const auto names = enum_names(ReconstructionTarget{});
+      const auto at = std::find(names.begin(), names.end(), file_.text(*target, "\"target\""));
+      if (at == names.end()) throw file_.wrong(*target, "\"target\" is neither \"mirrored\" nor \"own\"");
+      plan.target = static_cast<ReconstructionTarget>(at - names.begin());
+    }
+    if (const JsonValue* down = root.find("down")) plan.down = direction(*down, "\"down\"");
     return plan;
   }
 
@@ -126,6 +132,12 @@ class PlanReader {
     if (std::any_of(s.begin(), s.end(), [&](const T& t) { return t.name == name; }))
       throw file_.wrong(v, where + ": there is another \"" + name + "\" above", "give each a name of its own");
   }
+  Vec3 direction(const JsonValue& v, const std::string& called) const {
+    const Vec3 d = triple(v, called, 2);
+    if (std::abs(length(d) - 1) > kUnitTolerance)
+      throw file_.wrong(v, called + " is not of length 1", "divide it by its length");
+    return d;
+  }
   Vec3 triple(const JsonValue& v, const std::string& called, double limit) const {
     const auto& items = file_.list(v, called, 3);
     Vec3 out;
@@ -189,6 +201,9 @@ std::string plan_json(const SurgicalPlan& plan) {
                            {"tip_mm", json_of(s.tip_mm)},
                            {"diameter_mm", s.diameter_mm},
                            {"empty", s.empty}});
+  if (plan.target != ReconstructionTarget::mirrored)
+    j["target"] = enum_names(plan.target)[static_cast<std::size_t>(plan.target)];
+  if (!(plan.down == SurgicalPlan{}.down)) j["down"] = json_of(plan.down);
   std::string text = j.dump(1) + "\n";
   static_cast<void>(plan_of(text, "the plan"));
   return text;

@@ -489,6 +489,8 @@ Reconstruction reconstruct(const TriangleSoup& jaw, const TriangleSoup& donor_bo
   }
   out.donor_used_mm = best->placed.used_to_mm - params.reserve_mm;
   out.plan = plan_from(best->placed, placement.joints(best->chain), a, b, params.kerf_mm);
+  out.plan.target = params.target;
+  out.plan.down = down;
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/core/data/rigid_transform.h"
 #include "osteo/geometry/distance/triangle_tree.h"
 #include "solve.h"
@@ -161,7 +162,7 @@ SymmetryPlane find_symmetry_plane(const TriangleSoup& bone, const Context& conte
     SymmetryPlane rival = p;
     search.refine(rival, fine, kFineRounds);
     if (std::abs(dot(rival.normal, best.normal)) < other && rival.residual_mm < kAlike * best.residual_mm + kAlikeMm)
-      throw Error(ExitCode::failed, "the surface is as nearly symmetric about another plane",
+      throw Error(ExitCode::failed, tr_later("the surface is as nearly symmetric about another plane"),
                   "give a surface that shows left and right, such as the whole mandible");
     break;
   }

@@ -170,6 +170,9 @@ struct Sheet {
   std::map<std::string, std::string>
       marks;  ///< for programs: kept in the HTML as <meta name="osteotome-KEY">, not shown
   SheetBlocks blocks;
+  /// From a new page on, as large as `blocks` are by themselves: what came to a page that may be signed already, so it
+  /// is in no html_without_signature. Nor is the mark "after", which is of it.
+  SheetBlocks after;
   int pages =
       2;  ///< made smaller, down to seven tenths, until it fits on so many; longer only where that is not enough
 };
@@ -188,7 +191,8 @@ struct Sheet {
 /// "data:image/png;base64,..."
 [[nodiscard]] std::string png_url_of(const Picture& picture);
 
-/// The HTML as it would be without the text of its signature, to tell whether anything else changed.
+/// The HTML as it would be without the text of its signature and without Sheet::after, to tell whether anything else
+/// changed.
 [[nodiscard]] std::string html_without_signature(std::string_view html);
 /// Of HTML that sheet_html wrote. What cannot be read is not there.
 [[nodiscard]] std::map<std::string, Picture> pictures_of_html(std::string_view html);

@@ -54,10 +54,10 @@ struct CutOutcome {
 
 /// How far the outline of what the plan moves lies from a target, with the reference where it was. Of the plan: the
 /// surface of all fragments that it moves, along the shortest way to where the plan has that bone's surface. Of the
-/// mirrored side, where segments of another bone lie between two planes: from places on its lower border, 2 mm apart,
-/// across the axis of the segment that is planned there.
+/// plan's target (the mirrored side, or the bone's own outline), where segments of another bone lie between two planes:
+/// from places on its lower border, 2 mm apart, across the axis of the segment that is planned there.
 struct ContourOutcome {
-  std::string against;  ///< "plan", "mirrored side"
+  std::string against;  ///< "plan"; "mirrored side" or "bone's own outline"
   bool known = false;
   std::string why;
   Interval95 mean_mm, p95_mm;                      ///< of all places the mean, and what 95 % of them keep
@@ -99,7 +99,7 @@ struct PlateOutcome {
 struct Outcome {
   std::vector<FragmentOutcome> fragments;  ///< as in the plan
   std::vector<CutOutcome> cuts;            ///< of each fragment each plane
-  std::vector<ContourOutcome> contours;    ///< against the plan, against the mirrored side
+  std::vector<ContourOutcome> contours;    ///< against the plan, against its target
   std::vector<CondyleOutcome> condyles;    ///< left, right
   std::vector<ScrewOutcome> screws;        ///< as in the plan
   std::vector<PlateOutcome> plates;        ///< of each plate the reference, and each fragment within 5 mm of it

@@ -1,5 +1,6 @@
 // What is planned before surgery, as values: cut planes, fragments and where each fragment goes.
 #pragma once
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
@@ -48,11 +49,19 @@ struct PlannedPlate {
   TriangleSoup surface;  ///< closed
 };
 
+/// mirrored: the healthy side, across the plane of symmetry. own: the jaw as it is, where its outline is not changed.
+enum class ReconstructionTarget : int { mirrored, own };
+[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(ReconstructionTarget) {
+  return {"mirrored", "own"};
+}
+
 struct SurgicalPlan {
   std::vector<CutPlane> planes;
   std::vector<PlannedFragment> fragments;
   std::vector<PlannedScrew> screws;
   std::vector<PlannedPlate> plates;
+  ReconstructionTarget target = ReconstructionTarget::mirrored;      ///< of the contour that a bone is rebuilt to
+  Vec3 down{0, 0, -1};                                               ///< unit: its lower border is there
   [[nodiscard]] const CutPlane& plane(std::string_view name) const;  ///< Error(usage) with the names there are
 };
 
@@ -62,9 +71,10 @@ struct SurgicalPlan {
 ///   "fragments": [ {"name": "segment 1", "bone": "fibula", "planes": ["b", "c"],
 ///                   "rotation_rows": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "shift_mm": [x, y, z]} ],
 ///   "screws": [ {"name": "1", "fragment": "segment 1", "entry_mm": [x, y, z], "tip_mm": [x, y, z],
-///                "diameter_mm": 2, "empty": false} ] }
-/// `screws` may be left out, and is where there are none.
-/// Errors: usage, with file and line: another unit, unknown keys, ranges, a normal that is not of unit length, a
+///                "diameter_mm": 2, "empty": false} ],
+///   "target": "own", "down": [0, 0, -1] }
+/// `screws` may be left out, and is where there are none; `target` and `down` too, where they are "mirrored" and so.
+/// Errors: usage, with file and line: another unit, unknown keys, ranges, a direction that is not of unit length, a
 /// rotation that is not one (to 1e-9), two of one name, a plane that is not there or of another bone, a screw of no
 /// fragment or of no length. `name`: the
 /// file, as errors call it.

@@ -12,12 +12,6 @@
 
 namespace osteo::inline session {
 
-/// mirrored: the healthy side, across the plane of symmetry. own: the jaw as it is, where its outline is not changed.
-enum class ReconstructionTarget : int { mirrored, own };
-[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(ReconstructionTarget) {
-  return {"mirrored", "own"};
-}
-
 struct ReconstructionParams {
   ReconstructionTarget target = ReconstructionTarget::mirrored;
   std::array<double, 3> a_mm{}, a_normal{}, b_mm{}, b_normal{};  ///< resection planes; normals towards what is removed
