@@ -267,18 +267,7 @@ void bench_god_object() {
       "| us p50 | us p99.9 "
       "|\n|---|---|---|---|---|---|---|---|---|\n");
   for (const int n : {32, 64, 128}) {
-    Frame f;
-    f.dims = {n, n, n};
-    const double h = 80.0 / (n - 1);
-    f.spacing_mm = {h, h, h};
-    f.origin_mm = {-40, -40, -40};
-    std::vector<float> v(f.voxel_count());
-    std::size_t at = 0;
-    for (int k = 0; k < n; ++k)
-      for (int j = 0; j < n; ++j)
-        for (int i = 0; i < n; ++i)
-          v[at++] = static_cast<float>(test::duck(f.world_from_index({double(i), double(j), double(k)})));
-    const CubicField field(f, std::move(v));
+    const CubicField field = test::duck_field(n);
     const std::string what = "cubic grid " + std::to_string(n) + "^3";
     for (const double friction : {0.0, 0.3})
       duck_row(what.c_str(), field, static_cast<double>(field.memory_bytes()) / 1e6, friction);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "folders.h"
 #include "meshes.h"
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/error.h"
@@ -66,7 +67,7 @@ struct Subject {
 };
 inline std::vector<Subject> subjects() {
   std::vector<Subject> all;
-  const fs::path folder = fs::path(OSTEO_SHARED_DATA) / "meshes";
+  const fs::path folder = shared_data() / "meshes";
   for (const auto& [name, file] :
        {std::pair{"bunny", "bunny_capped_69664_morris.obj"}, std::pair{"gear", "gear_tetgen_542.obj"},
         std::pair{"happy", "happy_vrip_res4_15536.ply"}, std::pair{"dragon", "dragon_vrip_res3_47794.ply"}}) {

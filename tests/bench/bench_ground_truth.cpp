@@ -1,8 +1,9 @@
-// Haptic renderers against solids of which everything is known: the tables of docs/validation/ground-truth.md, and the files
-// beside them.
+// Haptic renderers against solids of which everything is known: the tables of docs/validation/ground-truth.md, and the
+// files beside them.
 #include <cstdio>
 
 #include "bench.h"
+#include "folders.h"
 #include "osteo/assessment/ground_truth/experiments.h"
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/io/surface_io.h"
@@ -12,7 +13,7 @@ namespace osteo {
 void bench_ground_truth(const Context& context) {
   truth::GroundTruthOptions o;
   // A real bone, where one is at hand.
-  const std::filesystem::path bone = std::filesystem::path(OSTEO_SHARED_DATA) / "meshes_bone" / "sofa_malleus.obj";
+  const std::filesystem::path bone = shared_data() / "meshes_bone" / "sofa_malleus.obj";
   if (std::filesystem::exists(bone)) {
     try {
       o.bone = soup_of(*load_surface(bone));

@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "bench.h"
+#include "folders.h"
 #include "haptics_tables.h"
 #include "osteo/core/base/simd.h"
 #include "osteo/core/rt/loop.h"
@@ -33,7 +34,7 @@ using haptics_tables::kMethods, haptics_tables::name_of, haptics_tables::Spread;
 
 /// A head from ../shared/data, or the phantom.
 BrickGrid head(double h, const Context& context, std::string& name) {
-  const std::filesystem::path folder = std::filesystem::path(OSTEO_SHARED_DATA) / "ct_head_unc";
+  const std::filesystem::path folder = shared_data() / "ct_head_unc";
   name = "phantom slab";
   if (std::filesystem::exists(folder)) {
     for (const auto& e : std::filesystem::directory_iterator(folder)) {

@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "bench.h"
+#include "folders.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/bone_import/import_bone.h"
 #include "osteo/imaging/dicom/save_series.h"
@@ -94,7 +95,7 @@ std::vector<fs::path> files_in(const fs::path& folder) {
 void make_series(const fs::path& to, int count, const std::function<void(DcmDataset&, int)>& change = {}) {
   fs::create_directories(to);
   std::vector<fs::path> base;
-  const fs::path real = fs::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom" / "S21570" / "S2030";
+  const fs::path real = shared_data() / "dicom_ct_skull_phantom" / "S21570" / "S2030";
   const fs::path made = to.parent_path() / "phantom";
   if (fs::exists(real)) {
     for (const auto& f : files_in(real)) {
@@ -249,7 +250,7 @@ bool read_with_osteo(const fs::path& folder) {
 
 // Where the readers put the slices of a real, tilted, uneven head: farthest corner from what its file says.
 void positions() {
-  const fs::path folder = fs::path(OSTEO_SHARED_DATA) / "dicom_ct_head_tilt_gaps";
+  const fs::path folder = shared_data() / "dicom_ct_head_tilt_gaps";
   if (!fs::exists(folder)) {
     std::printf("\n(No %s: the table of positions is left out.)\n", folder.c_str());
     return;

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "bench.h"
+#include "folders.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/dicom/import.h"
@@ -102,13 +103,13 @@ void bench_registration(const Context& context) {
     }
     save_image(second, folder.path() / "second.nrrd");
     std::ofstream(folder.path() / "truth.tfm") << itk_transform_text(pair.second.second_from_first);
-    const std::string command = std::string(OSTEO_SOURCE) + "/build/peers/bin/python3 " + OSTEO_SOURCE +
+    const std::string command = source_folder().string() + "/build/peers/bin/python3 " + source_folder().string() +
                                 "/tests/bench/peers_registration.py " + folder.path().string() + " '" + pair.name + "'";
     std::fflush(stdout);
     if (std::system(command.c_str()) != 0)
       std::printf("| %s | SimpleITK: not at hand in build/peers | | | | |\n", pair.name);
   }
-  const auto data = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom";
+  const auto data = shared_data() / "dicom_ct_skull_phantom";
   if (std::filesystem::exists(data)) {
     const Image straight = import_ct(data / "S21570" / "S2030", {}).image,
                 tilted = import_ct(data / "S21610" / "S2010", {}).image;

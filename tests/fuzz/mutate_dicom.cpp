@@ -11,6 +11,7 @@
 #include <fstream>
 #include <random>
 
+#include "folders.h"
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/dicom/import.h"
 #include "osteo/imaging/dicom/objects.h"
@@ -127,7 +128,7 @@ int main(int argc, char** argv) {
   if (folders.empty()) {
     for (const char* f : {"dicom_hard_files", "dicom_transfer_syntaxes", "dicom_hard_geometry",
                           "dicom_ct_skull_phantom/S21570/S4010", "dicom_ct_head_tilt_gaps"}) {
-      folders.push_back(std::string(OSTEO_SHARED_DATA) + "/" + f);
+      folders.push_back(shared_data().string() + "/" + f);
     }
   }
   const TemporaryFolder scratch;

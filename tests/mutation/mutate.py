@@ -23,7 +23,7 @@ LIBRARIES = {
     "scene": (["libs/session/scene/src/*.cpp"], ["test_scene"]),
     "tutor": (["libs/network/tutor/src/*.cpp"], ["test_tutor"], ["osteo"], r"^stages\.works\.tutoring"),
     "evidence": (["libs/assessment/evidence/src/*.cpp"], ["test_evidence"]),
-    "pacs": (["libs/hospital/pacs/src/*.cpp"], ["test_pacs"], ["osteo"], r"^pacs\.[a-z]"),
+    "pacs": (["libs/hospital/pacs/src/*.cpp"], ["test_pacs"], ["osteo"], r"^(pacs\.[a-z]|doctor\.server)"),
     "dicom": (["libs/imaging/dicom/src/plac*.cpp"], ["test_dicom"]),
 }
 # Texts only for people, and loops for one kind of processor.
@@ -84,10 +84,17 @@ def sites(library):
     return found
 
 
+def shared_data():
+    """Where this tree was told to look for it."""
+    cache = ROOT / "build/release/CMakeCache.txt"
+    told = re.search(r"^OSTEO_SHARED_DATA:\w+=(.+)$", cache.read_text(), re.M) if cache.exists() else None
+    return told[1] if told else f"{ROOT}/../shared/data"
+
+
 class Worker:
     """A copy of the sources with a build of its own."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, libraries):
         self.folder, self.build = folder, folder / "build/release"
         folder.mkdir(parents=True, exist_ok=True)
         files = subprocess.run(
@@ -101,10 +108,18 @@ class Worker:
             if source.is_file() and not (target.exists() and target.read_bytes() == source.read_bytes()):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(source, target)
-        # Each source alone, so that one change is one small compilation.
-        options = ["-DCMAKE_BUILD_TYPE=Release", "-DOSTEO_UNITY=0", f"-DOSTEO_SHARED_DATA={ROOT}/../shared/data"]
-        # An index beyond its array ends the program here as it does in CI's unit tests.
-        options.append("-DCMAKE_CXX_FLAGS=-D_GLIBCXX_ASSERTIONS")
+        # What is changed is compiled a source at a time, so that one change is one small compilation, and with an index
+        # beyond its array ending the program as it does in CI's unit tests. All else is built as users have it: where
+        # ccache is used it has that already, and the first build takes minutes instead of an hour.
+        alone = "".join(
+            f"cmake_language(DEFER CALL set_target_properties osteo_{name} PROPERTIES UNITY_BUILD OFF)\n"
+            f"cmake_language(DEFER CALL target_compile_definitions osteo_{name} PRIVATE _GLIBCXX_ASSERTIONS)\n"
+            for name in libraries
+        )
+        self.build.mkdir(parents=True, exist_ok=True)
+        (self.build / "alone.cmake").write_text(alone)
+        options = ["-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_PROJECT_INCLUDE={self.build}/alone.cmake"]
+        options.append(f"-DOSTEO_SHARED_DATA={shared_data()}")
         subprocess.run(
             ["cmake", "-S", folder, "-B", self.build, "-G", "Ninja", *options], check=True, stdout=subprocess.DEVNULL
         )
@@ -209,7 +224,7 @@ def main():
     workers = []
     for n in range(options.jobs):
         print(f"building copy {n + 1} of {options.jobs} ...", flush=True)
-        workers.append(Worker(options.work.resolve() / f"copy-{n}"))
+        workers.append(Worker(options.work.resolve() / f"copy-{n}", libraries))
         built = workers[-1].make(everything + sorted({p for l in libraries for p in (LIBRARIES[l][2:] or [[]])[0]}))
         if built.returncode != 0:
             sys.exit(built.stdout[-3000:])

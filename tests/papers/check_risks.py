@@ -11,8 +11,8 @@ tests = {
     for m in re.finditer(r"^TEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)\)", p.read_text(), re.M)
 }
 cmake = (root / "tests/CMakeLists.txt").read_text()
-tests |= set(re.findall(r"add_test\(NAME ([\w.]+)", cmake))
-tests |= {f"pacs.{part}" for part in re.search(r"foreach\(part ([\w ]+)\)\s+add_test\(NAME pacs\.", cmake)[1].split()}
+tests |= set(re.findall(r"osteo_test\(NAME ([\w.]+)", cmake))
+tests |= {f"pacs.{part}" for part in re.search(r"foreach\(part ([\w ]+)\)\s+osteo_test\(NAME pacs\.", cmake)[1].split()}
 
 
 def wrong(text):

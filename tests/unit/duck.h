@@ -1,10 +1,13 @@
 // A smooth closed shape with everything known: surface, normals, and a recording of a probe moving over it with a known
 // force. It stands for the scanned duck of D. Morris 2006, chapter 7.
 #pragma once
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "osteo/geometry/mesh/soup.h"
+#include "osteo/simulation/haptics/fields.h"
 
 namespace osteo::test {
 
@@ -25,6 +28,22 @@ inline Vec3 duck_normal(Vec3 x) {
   return normalized({duck(x + Vec3{e, 0, 0}) - duck(x - Vec3{e, 0, 0}),
                      duck(x + Vec3{0, e, 0}) - duck(x - Vec3{0, e, 0}),
                      duck(x + Vec3{0, 0, e}) - duck(x - Vec3{0, 0, e})});
+}
+
+/// On a grid of n voxels along each axis, from -half to half.
+inline CubicField duck_field(int n, double half = 40) {
+  Frame f;
+  f.dims = {n, n, n};
+  const double h = 2 * half / (n - 1);
+  f.spacing_mm = {h, h, h};
+  f.origin_mm = {-half, -half, -half};
+  std::vector<float> v(f.voxel_count());
+  std::size_t at = 0;
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i)
+        v[at++] = static_cast<float>(duck(f.world_from_index({double(i), double(j), double(k)})));
+  return CubicField(f, std::move(v));
 }
 
 /// 2 (rings - 1) sectors triangles.

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "folders.h"
 #include "osteo/geometry/mesh/soup.h"
 #include "osteo/imaging/io/surface_io.h"
 
@@ -79,7 +80,7 @@ inline TriangleSoup unwelded(const TriangleSoup& s) {
 inline std::vector<std::filesystem::path> real_meshes() {
   std::vector<std::filesystem::path> paths;
   for (const char* folder : {"meshes", "meshes_hard", "meshes_bone"}) {
-    const std::filesystem::path f = std::filesystem::path(OSTEO_SHARED_DATA) / folder;
+    const std::filesystem::path f = shared_data() / folder;
     if (!std::filesystem::exists(f)) continue;
     for (const auto& e : std::filesystem::directory_iterator(f)) {
       if (is_surface_file(e.path())) paths.push_back(e.path());

@@ -44,5 +44,37 @@ TEST_F(Points, OfSlicerInItsCoordinates) {
   EXPECT_THROW(static_cast<void>(read("p.fcsv", "# CoordinateSystem = LPS\n7,1,2\n")), Error);
 }
 
+// As Slicer 5 saves points, a line or a curve.
+TEST_F(Points, OfSlicerAsItSavesThemNow) {
+  const auto list = [](const std::string& head, const std::string& points) {
+    return "{\"@schema\": \"markups-schema-v1.0.3.json#\", \"markups\": [{\"type\": \"Curve\", " + head +
+           "\"controlPoints\": [" + points + "]}]}";
+  };
+  const std::string two =
+      "{\"id\": \"1\", \"label\": \"F, 1\", \"position\": [1, 2.5, -3e1], \"positionStatus\": \"defined\"},"
+      "{\"id\": \"2\", \"position\": [0, 0, 0], \"positionStatus\": \"undefined\"},"
+      "{\"id\": \"3\", \"position\": [4, 5, 6]}";
+  for (const char* const lps : {"\"coordinateSystem\": \"LPS\", \"coordinateUnits\": \"mm\",", ""})
+    EXPECT_EQ(read("F.mrk.json", list(lps, two)), (std::vector<Vec3>{{1, 2.5, -30}, {4, 5, 6}}));
+  EXPECT_EQ(read("F.MRK.JSON", list("\"coordinateSystem\": \"RAS\",", two)),
+            (std::vector<Vec3>{{-1, -2.5, -30}, {-4, -5, 6}}));
+  const auto refused = [&](const std::string& text) {
+    try {
+      static_cast<void>(read("F.mrk.json", text));
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("taken");
+  };
+  EXPECT_NE(refused(list("\"coordinateSystem\": \"IJK\",", two)).find("coordinates 'IJK'"), std::string::npos);
+  EXPECT_NE(refused(list("\"coordinateUnits\": \"um\",", two)).find("in 'um', not in mm"), std::string::npos);
+  EXPECT_NE(refused(list("", "{\"position\": [1, 2]}")).find("three finite numbers"), std::string::npos);
+  EXPECT_NE(refused(list("", "{\"position\": [1, null, 2]}")).find("three finite numbers"), std::string::npos);
+  EXPECT_NE(refused(list("", "")).find("holds no points"), std::string::npos);
+  EXPECT_NE(refused("{\"markups\": [{}, {}]}").find("2 lists"), std::string::npos);
+  for (const char* const other : {"{\"a\": 1}", "[1, 2, 3]", "1,2,3\n", "{\"markups\": []}"})
+    EXPECT_NE(refused(other).find("no list of points"), std::string::npos) << other;
+}
+
 }  // namespace
 }  // namespace osteo

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "folders.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/data/vec.h"
 #include "osteo/imaging/dicom/save_series.h"
@@ -20,7 +21,7 @@
 namespace osteo::test {
 
 inline fs::path data(const char* name) {
-  return fs::path(OSTEO_SHARED_DATA) / name;
+  return shared_data() / name;
 }
 
 inline fs::path scratch(const std::string& name) {

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <random>
 
+#include "folders.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/dicom/import.h"
@@ -15,7 +16,7 @@ namespace osteo {
 namespace {
 
 fs::path encoded(const std::string& name) {
-  return fs::path(OSTEO_SOURCE) / "testdata/encodings" / (name + ".dcm");
+  return source_folder() / "testdata/encodings" / (name + ".dcm");
 }
 
 Imported load(const fs::path& file) {

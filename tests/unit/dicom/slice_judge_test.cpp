@@ -6,6 +6,7 @@
 #include <random>
 
 #include "edit.h"
+#include "folders.h"
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/dicom/detail/verdict_codes.h"
 #include "osteo/imaging/dicom/import.h"
@@ -304,7 +305,7 @@ TEST(SliceJudge, RealSeriesHaveNoFault) {
 // Every code has its row, and the page holds the same rows.
 TEST(VerdictCodes, TableAndPageAgree) {
   std::vector<std::string> rows;
-  std::ifstream page(fs::path(OSTEO_SOURCE) / "docs" / "formats" / "verdict.md");
+  std::ifstream page(source_folder() / "docs" / "formats" / "verdict.md");
   for (std::string line; std::getline(page, line);) {
     if (line.starts_with("| `") && line.find_first_of("abcdefghijklmnopqrstuvwxyz") > line.find('`', 3))
       rows.push_back(line);
@@ -313,7 +314,7 @@ TEST(VerdictCodes, TableAndPageAgree) {
   for (const VerdictCode& c : verdict_codes()) wanted.push_back(table_row(c));
   EXPECT_EQ(rows, wanted);
   std::string text;
-  for (const auto& f : fs::recursive_directory_iterator(fs::path(OSTEO_SOURCE) / "libs")) {
+  for (const auto& f : fs::recursive_directory_iterator(source_folder() / "libs")) {
     if (f.path().filename() != "verdict.h") continue;
     std::ifstream header(f.path());
     text.append(std::istreambuf_iterator<char>(header), {});

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <random>
 
+#include "folders.h"
 #include "meshes.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/distance/distance_map.h"
@@ -541,7 +542,7 @@ TEST(SweptDistance, IsNeverBelowAndNearlyExact) {
 
 TEST(RealMeshes, ExactAndSigned) {
   const auto paths = test::real_meshes();
-  if (paths.empty()) GTEST_SKIP() << "no real meshes in " << OSTEO_SHARED_DATA;
+  if (paths.empty()) GTEST_SKIP() << "no real meshes in " << shared_data();
   std::mt19937 random(5);
   for (const auto& path : paths) {
     SCOPED_TRACE(path.filename().string());

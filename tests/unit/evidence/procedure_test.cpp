@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "folders.h"
 #include "osteo/assessment/evidence/score.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -30,12 +31,12 @@ std::string with(const std::string& rest) {
 
 TEST(Procedures, ThoseOfTheProjectAreRead) {
   for (const char* const name : {"mastoidectomy.json", "mandible-split.json"}) {
-    const Procedure p = load_procedure(std::filesystem::path(OSTEO_SOURCE) / "pipelines/procedures" / name);
+    const Procedure p = load_procedure(source_folder() / "pipelines/procedures" / name);
     EXPECT_FALSE(p.items.empty()) << name;
     EXPECT_FALSE(p.steps.empty()) << name;
     EXPECT_EQ(p.file, name);
   }
-  const Procedure ear = load_procedure(std::filesystem::path(OSTEO_SOURCE) / "pipelines/procedures/mastoidectomy.json");
+  const Procedure ear = load_procedure(source_folder() / "pipelines/procedures/mastoidectomy.json");
   EXPECT_EQ(ear.find("facial nerve")->role, ProcedureRole::never_touch);
   EXPECT_EQ(ear.items[1].threshold, 0.4);
   EXPECT_EQ(ear.items[2].threshold, usual_threshold(ItemKind::no_hole));
@@ -153,7 +154,7 @@ TEST(FacePart, IsByPlaceAlongTheLineAndByWhereItLooks) {
 }
 
 TEST(Metrics, TheTableInTheDocsIsTheirDeclaration) {
-  const std::string docs = read_text(std::filesystem::path(OSTEO_SOURCE) / "docs/validation/evidence.md");
+  const std::string docs = read_text(source_folder() / "docs/validation/evidence.md");
   EXPECT_NE(docs.find(metric_table_markdown()), std::string::npos) << metric_table_markdown();
 }
 

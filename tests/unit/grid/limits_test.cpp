@@ -5,6 +5,7 @@
 
 #include <functional>
 
+#include "folders.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/geometry/grid/brick_grid.h"
@@ -77,7 +78,7 @@ TEST(BrickLimits, AVoxelFarOutInAFile) {
   // As it lies in testdata, to the byte, for those who try the commands on it.
   const auto path = fs::temp_directory_path() / ("osteo-far-" + std::to_string(::getpid()) + ".vdb");
   save_grid(at(1 << 25), path);
-  EXPECT_TRUE(read_text(path) == read_text(fs::path(OSTEO_SOURCE) / "testdata/far25.vdb"));
+  EXPECT_TRUE(read_text(path) == read_text(source_folder() / "testdata/far25.vdb"));
   expect_refused(ExitCode::corrupt, "more than can be counted", [&] { static_cast<void>(load_grid(path)); });
   fs::remove(path);
   expect_refused(ExitCode::corrupt, "too far apart", [&] { static_cast<void>(to_bricks(at(1 << 18))); });

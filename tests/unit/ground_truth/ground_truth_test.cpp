@@ -4,6 +4,7 @@
 #include <fstream>
 #include <numbers>
 
+#include "folders.h"
 #include "osteo/assessment/ground_truth/experiments.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -411,7 +412,7 @@ TEST(Processes, AreMeasuredLikeTheOthers) {
   p.rate_hz = 200;
   const Trajectory t = true_trajectory(*sphere, p);
   const RenderSettings s{.stiffness_n_per_mm = 0.5};
-  const std::string program = std::string("python3 '") + OSTEO_SOURCE + "/tests/unit/ground_truth/sphere_renderer.py'";
+  const std::string program = "python3 '" + source_folder().string() + "/tests/unit/ground_truth/sphere_renderer.py'";
   const auto renderer = make_process_renderer(program, sphere->mesh(2000), s);
   const Played first = play(t, *renderer, s), again = play(t, *renderer, s);
   EXPECT_LT(first.accuracy.mean_n, 0.01);  // it fits a sphere to the corners

@@ -10,22 +10,7 @@
 namespace osteo {
 namespace {
 
-using test::DuckError;
-
-CubicField duck_field(int n, double half = 40) {
-  Frame f;
-  f.dims = {n, n, n};
-  const double h = 2 * half / (n - 1);
-  f.spacing_mm = {h, h, h};
-  f.origin_mm = {-half, -half, -half};
-  std::vector<float> v(f.voxel_count());
-  std::size_t at = 0;
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i)
-        v[at++] = static_cast<float>(test::duck(f.world_from_index({double(i), double(j), double(k)})));
-  return CubicField(f, std::move(v));
-}
+using test::duck_field, test::DuckError;
 
 // The recording through the renderer: mean of |true - rendered| (equation 3 of the thesis, which calls it RMS).
 template <class Field>

@@ -12,7 +12,7 @@ namespace osteo {
 namespace {
 
 std::vector<std::byte> checkpoint_bytes() {
-  return read_file(fs::path(OSTEO_SOURCE) / "testdata/neural/flat/fold_0/checkpoint_final.pth");
+  return read_file(source_folder() / "testdata/neural/flat/fold_0/checkpoint_final.pth");
 }
 
 // What was asked for beyond the file's end is counted: the reader may not do so.

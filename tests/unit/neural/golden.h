@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "folders.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/io/volume_io.h"
 #include "osteo/imaging/neural/detail/half.h"
@@ -15,7 +16,7 @@
 namespace osteo {
 
 inline fs::path golden(const std::string& name) {
-  return fs::path(OSTEO_SOURCE) / "testdata/neural" / name;
+  return source_folder() / "testdata/neural" / name;
 }
 
 /// Of a damaged file: more of them by OSTEO_MUTATIONS, for a run by hand.

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "folders.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/neural/detail/half.h"
@@ -76,7 +77,7 @@ TEST(NetworkTrust, SameBitsForAnyNumberOfThreads) {
 }
 
 TEST(NetworkTrust, TheShippedCalibrationIsOfTheShippedNetwork) {
-  const fs::path folder = fs::path(OSTEO_SOURCE) / "testdata/neural/ear";
+  const fs::path folder = source_folder() / "testdata/neural/ear";
   const NetworkModel model =
       read_network_model(read_text(folder / "plans.json"), read_text(folder / "dataset.json"), "3d_fullres");
   const NetworkCalibration c = read_network_calibration(read_text(folder / "calibration.json"), model);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "node.h"
 #include "osteo/core/base/error.h"
 #include "osteo/hospital/pacs/receive.h"
 #include "osteo/hospital/pacs/send.h"
@@ -22,6 +23,30 @@ TEST(Peer, IsReadStrictly) {
   for (const char* const bad : {"", "@h:1", "A@:1", "A@h", "A@h:", "A@h:0", "A@h:65536", "A@h:1x", "A@h:-1", "h:104",
                                 "A@[::1]:104", "SEVENTEENLETTERS1@h:1", "A\\B@h:1", "\x01@h:1"})
     EXPECT_THROW(static_cast<void>(parse_peer(bad)), Error) << bad;
+}
+
+TEST(Tls, WhatIsMissingIsToldBeforeAnyFileIsRead) {
+  const auto code = [](const DicomTls& tls, T_ASC_NetworkRole role) {
+    try {
+      static_cast<void>(pacs::tls_layer(tls, role));
+    } catch (const Error& e) {
+      return e.code();
+    }
+    return ExitCode::ok;
+  };
+  const std::string ca = testing::TempDir() + "no-such-ca.pem", own = testing::TempDir() + "no-such.pem";
+  for (const T_ASC_NetworkRole role : {NET_REQUESTOR, NET_ACCEPTOR}) {
+    EXPECT_EQ(code({}, role), ExitCode::ok) << "no TLS";
+    EXPECT_EQ(pacs::tls_layer({}, role), nullptr);
+    EXPECT_EQ(code({"", own, ""}, role), ExitCode::usage);
+    EXPECT_EQ(code({"", "", own}, role), ExitCode::usage);
+    EXPECT_EQ(code({"", own, own}, role), ExitCode::usage);
+    EXPECT_EQ(code({ca, own, ""}, role), ExitCode::usage);
+    EXPECT_EQ(code({ca, "", own}, role), ExitCode::usage);
+    EXPECT_EQ(code({ca, own, own}, role), ExitCode::no_input) << "its files are not there";
+  }
+  EXPECT_EQ(code({ca, "", ""}, NET_REQUESTOR), ExitCode::no_input) << "a client may do without";
+  EXPECT_EQ(code({ca, "", ""}, NET_ACCEPTOR), ExitCode::usage);
 }
 
 TEST(Receive, NeedsToKnowWhoMaySend) {

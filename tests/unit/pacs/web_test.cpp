@@ -53,6 +53,19 @@ TEST(Multipart, WhatIsNoneIsRefused) {
   for (const std::string& boundary :
        {std::string(), std::string(71, 'a'), std::string("a\r\nb"), std::string("a "), std::string("a\"b")})
     EXPECT_THROW(MultipartReader(boundary, {}), Error) << boundary;
+  // RFC 2046 allows these, and no others.
+  std::string allowed;
+  for (int c = 1; c < 128; ++c) {
+    const std::string boundary{static_cast<char>(c), 'b'};
+    try {
+      MultipartReader(boundary, {});
+      allowed += static_cast<char>(c);
+    } catch (const Error&) {
+      continue;
+    }
+  }
+  EXPECT_EQ(allowed, " '()+,-./0123456789:=?ABCDEFGHIJKLMNOPQRSTUVWXYZ_abcdefghijklmnopqrstuvwxyz");
+  EXPECT_NO_THROW(MultipartReader(std::string(70, 'a'), {}));
 }
 
 // Whatever comes: the same parts, or the same refusal, in pieces of any size, and nothing is read that is not there

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <iostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "osteo/core/base/error.h"
@@ -326,6 +328,142 @@ TEST(OutcomeMetal, APlateThatIsNotThereIsNotKnown) {
   const TrueSolid lump = solid_of(TrueRod{to({-16, 0, 0}), to({16, 0, 0}), 9}, 6000);
   const Outcome other = measured(d.plan, ct_of(d, {lump}, {}, 5));
   for (const PlateOutcome& p : other.plates) EXPECT_FALSE(p.pose.known) << p.against;
+}
+
+// Two plates in one file are rigid each by itself: taken for one, both were where the first lay.
+TEST(OutcomeMetal, EachPieceOfAPlatesFileIsAPlate) {
+  const BentBar bar;
+  Done d = operation(21, {}, kPlateShare);
+  const RigidTransform back = d.truth.fragments[0].postop_from_ct;
+  TriangleSoup both;
+  std::vector<TrueSolid> metal;
+  std::vector<RigidTransform> off;
+  for (const double up : {6.5, -6.5}) {
+    RigidTransform planned = d.bar;
+    planned.shift_mm += d.bar.rotation.column[1] * up;
+    off.push_back(motion(planned.shift_mm, Vec3{0.3, -0.4, 0.2} * (up > 0 ? 1 : -1), {0, up > 0 ? 2.0 : -2.0, 1}));
+    metal.push_back(solid_of(bar, back * off.back() * planned));
+    const TriangleSoup one = bar.surface(planned);
+    const auto first = static_cast<std::uint32_t>(both.points_mm.size());
+    both.points_mm.insert(both.points_mm.end(), one.points_mm.begin(), one.points_mm.end());
+    for (const auto& t : one.triangles) both.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  d.plan.plates.push_back({"plate", both});
+  const Outcome o = measured(d.plan, ct_of(d, metal, {}, 21));
+  std::vector<std::string> names;
+  Errors errors;
+  for (const PlateOutcome& p : o.plates) {
+    if (p.against != "back") continue;
+    names.push_back(p.pose.name);
+    errors.add(p.pose, off[p.pose.name == "plate 1" ? 0 : 1]);
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"plate 1", "plate 2"}));
+  EXPECT_EQ(errors.unknown, 0);
+  EXPECT_LT(most(errors.plate_mm), 0.15);
+  EXPECT_LT(most(errors.plate_deg), 0.5);
+}
+
+// What a plate encloses is a hollow of it, and a crumb beside it no plate.
+TEST(OutcomeMetal, HollowsAndCrumbsAreNoPlates) {
+  const BentBar bar, crumb{1, 1, 0.8, 0};
+  Done d = operation(22, {}, kPlateShare);
+  TriangleSoup file = bar.surface(d.bar);
+  const auto add = [&](TriangleSoup more, bool inwards) {
+    const auto first = static_cast<std::uint32_t>(file.points_mm.size());
+    file.points_mm.insert(file.points_mm.end(), more.points_mm.begin(), more.points_mm.end());
+    for (auto t : more.triangles) {
+      if (inwards) std::swap(t[1], t[2]);
+      file.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    }
+  };
+  add(BentBar{12, 1.5, 0.3, 0.25}.surface(d.bar), true);
+  RigidTransform beside = d.bar;
+  beside.shift_mm += d.bar.rotation.column[1] * 9.0;
+  add(crumb.surface(beside), false);
+  d.plan.plates.push_back({"plate", file});
+  const RigidTransform there = d.truth.fragments[0].postop_from_ct * d.bar_off * d.bar;
+  const Outcome o = measured(d.plan, ct_of(d, {solid_of(bar, there)}, {}, 22));
+  int plates = 0, crumbs = 0;
+  for (const PlateOutcome& p : o.plates) {
+    if (p.against != "back") continue;
+    plates += p.pose.known ? 1 : 0;
+    crumbs += p.pose.why.find("too small for a plate") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_EQ(plates, 1);
+  EXPECT_EQ(crumbs, 1);
+}
+
+// Nothing but its place says whose a screw is: far from there, the file says that it may be another's.
+TEST(OutcomeMetal, AScrewThatNobodyPlannedIsTold) {
+  Done d = operation(23, {screw_at("1", -12, 0), screw_at("2", 9, 0)});
+  const RigidTransform to = placed(d.truth, "back");
+  const Vec3 beside = normalized(cross(outwards(), d.plan.screws[0].tip_mm - d.plan.screws[0].entry_mm));
+  const Vec3 by = (length(beside) > 0 ? beside : any_perpendicular(outwards())) * 2.1;
+  const TrueSolid other =
+      solid_of(TrueRod{to(d.plan.screws[0].entry_mm + by), to(d.plan.screws[0].tip_mm + by), 2, 1.5}, 6000);
+  d.rods[1] = {d.plan.screws[1].entry_mm, d.plan.screws[1].tip_mm, 2, 1.5};
+  const Outcome o = measured(d.plan, ct_of(d, {other}, {}, 23, "1"));
+  ASSERT_TRUE(o.screws[0].known) << o.screws[0].why;
+  EXPECT_NE(o.screws[0].finding.find("that nobody planned"), std::string::npos);
+  ASSERT_TRUE(o.screws[1].known) << o.screws[1].why;
+  EXPECT_EQ(o.screws[1].finding, "");
+}
+
+// An oblique screw in a segment that slides along itself: of what is left of its place, across both, intervals hold.
+TEST(OutcomeMetal, ObliqueScrewsInAShaftAreHeldAcrossIt) {
+  // 60 mm of the fibula beside the jaw, the screw near one end: edges within 8 mm of metal are left out.
+  const Vec3 axis{0, 0, 1}, middle{92, 0, -775}, out{0, 1, 0};
+  SurgicalPlan plan;
+  plan.planes = {world().advanced.planes[0],
+                 {"low", "fibula", middle - axis * 30.0, -axis, 1, true},
+                 {"high", "fibula", middle + axis * 30.0, axis, 1, true}};
+  RigidTransform beside;
+  beside.shift_mm = world().phantom.a_mm + outwards() * 30.0 - middle;
+  plan.fragments = {world().advanced.fragments[0], {"shaft", "fibula", {"low", "high"}, beside}};
+  PlannedScrew s;
+  s.name = "oblique";
+  s.fragment = "shaft";
+  s.entry_mm = middle + axis * 14.0 + out * 12;
+  while (world().donor.at(s.entry_mm) > 0) s.entry_mm -= out * 0.05;
+  s.tip_mm = s.entry_mm - normalized(out - axis * 0.8) * 9.0;
+  plan.screws = {s};
+  Errors errors;
+  int sliding = 0;
+  for (std::uint64_t seed = 31; seed <= 33; ++seed) {
+    Done d;
+    d.plan = plan;
+    d.truth = surgery(world(), d.plan, 0.7, 2, seed);
+    statistics::Random random(seed);
+    const Vec3 w = normalized(s.tip_mm - s.entry_mm), x = any_perpendicular(w), y = cross(w, x);
+    const RigidTransform off = motion(s.entry_mm, x * uniform(random, -0.6, 0.6) + y * uniform(random, -0.6, 0.6),
+                                      x * uniform(random, -4, 4) + y * uniform(random, -4, 4));
+    const TrueRod rod{off(s.entry_mm), off(s.tip_mm), s.diameter_mm, 1.5};
+    const RigidTransform to = d.truth.fragments[1].postop_from_ct;
+    TrueRod there = rod;
+    there.entry = to(rod.entry);
+    there.tip = to(rod.tip);
+    const Outcome o = measured(d.plan, ct_of(d, {solid_of(there)}, {}, seed));
+    ASSERT_EQ(o.screws.size(), 1U);
+    const ScrewOutcome& m = o.screws[0];
+    ASSERT_TRUE(m.known) << m.why;
+    if (m.slides_along == Vec3{}) continue;
+    ++sliding;
+    // Of the entry what is neither along the planned screw nor along the shaft: one direction.
+    const Vec3 known = normalized(cross(w, m.slides_along)), e = normalized(rod.tip - rod.entry);
+    const Vec3 truth = rod.entry + e * (dot(s.entry_mm - rod.entry, w) / dot(e, w)) - s.entry_mm;
+    Vec3 value;
+    for (std::size_t k = 0; k < 3; ++k) value[k] = m.entry_mm[k].value;
+    EXPECT_NEAR(length(value - known * dot(value, known)), 0, 1e-6) << "nothing is said of what is not known";
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(m.entry_mm[k].value, known[k] * dot(truth, known), 0.3);
+      if (m.entry_mm[k].half > 1e-6) errors.ask(0, m.entry_mm[k], known[k] * dot(truth, known));
+      // The half-widths are those of one number, as its direction has them.
+      EXPECT_NEAR(m.entry_mm[k].half * std::abs(known[0]), m.entry_mm[0].half * std::abs(known[k]), 1e-6);
+    }
+  }
+  EXPECT_EQ(sliding, 3);
+  EXPECT_GT(errors.over_half(0), 0.03);
+  EXPECT_LT(errors.over_half(0), 1);
 }
 
 // As the benchmark of outcomes: OSTEO_OUTCOME_SEEDS=601-640 test_planning --gtest_filter=OutcomeMetal.Benchmark

@@ -18,11 +18,15 @@ inline constexpr double kDeg = 3.14159265358979323846 / 180;
 struct World {
   JawPhantom phantom;
   BoneField jaw, donor;
-  SurgicalPlan rebuilt;   ///< from fibula segments, which lie upon each other
-  SurgicalPlan advanced;  ///< one cut, the front moved away: faces that a CT shows
+  SurgicalPlan rebuilt;                   ///< from fibula segments, which lie upon each other
+  std::vector<Vec3> contour_mm, axis_mm;  ///< of `rebuilt`: its target, and the corners of its axes
+  SurgicalPlan advanced;                  ///< one cut, the front moved away: faces that a CT shows
   explicit World(std::uint64_t seed) : phantom(make_jaw_phantom(seed, 12)), jaw(phantom.jaw), donor(phantom.donor) {
     ReconstructionParams r = test::params_for(phantom);
-    rebuilt = reconstruct(phantom.jaw, phantom.donor, r).plan;
+    const Reconstruction all = reconstruct(phantom.jaw, phantom.donor, r);
+    rebuilt = all.plan;
+    contour_mm = all.contour_mm;
+    axis_mm = all.axis_mm;
     const Vec3 e = phantom.a_normal;
     advanced.planes = {{"stays", "mandible", phantom.a_mm, e, 1, true},
                        {"moves", "mandible", phantom.a_mm + e * 1.0, e, 1, false}};

@@ -11,6 +11,7 @@
 #include <optional>
 #include <sstream>
 
+#include "folders.h"
 #include "mirror.h"
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/dicom/import.h"
@@ -166,7 +167,7 @@ TEST(RegisterRefuses, AnotherPatient) {
 
 // Two people, each whole head on a real scanner, and a skull of plastic.
 TEST(RegisterRefuses, RealHeadsOfOthers) {
-  const auto data = std::filesystem::path(OSTEO_SHARED_DATA);
+  const auto data = shared_data();
   if (!std::filesystem::exists(data / "ct_head_unc") || !std::filesystem::exists(data / "dicom_ct_head_tilt_gaps"))
     GTEST_SKIP() << "no real heads at hand";
   std::filesystem::path unc;
@@ -209,7 +210,7 @@ TEST(RegisterRefuses, TheOtherSide) {
 // A file with left and right exchanged, of a head whose sides are nearly alike: half of all edges meet to half a
 // millimetre.
 TEST(RegisterRefuses, AMirroredRealSkull) {
-  const auto data = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom" / "S21570" / "S2030";
+  const auto data = shared_data() / "dicom_ct_skull_phantom" / "S21570" / "S2030";
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "no real skull phantom at hand";
   const Image skull = import_ct(data, {}).image;
   RegisterParams p;
@@ -292,7 +293,7 @@ struct UnevenHead {
   }
 };
 std::vector<UnevenHead> uneven_heads() {
-  const auto data = std::filesystem::path(OSTEO_SHARED_DATA);
+  const auto data = shared_data();
   std::vector<UnevenHead> heads{{"skull", data / "dicom_ct_skull_phantom" / "S21570" / "S2030", ""},
                                 {"head", data / "dicom_ct_head_tilt_gaps", ""},
                                 {"unc", data / "ct_head_unc" / "CThead_HU_256x256x113_derived.nrrd", "LPI"}};
@@ -523,7 +524,7 @@ TEST(Register, CheckerboardShowsBoth) {
 
 // The skull phantom of a real scanner, straight at 1 mm and tilted at 2.4 mm.
 TEST(Register, RealSkullStraightAndTilted) {
-  const auto data = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom";
+  const auto data = shared_data() / "dicom_ct_skull_phantom";
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "no real skull phantom at hand";
   const Image straight = import_ct(data / "S21570" / "S2030", {}).image,
               tilted = import_ct(data / "S21610" / "S2010", {}).image;

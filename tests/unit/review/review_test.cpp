@@ -293,6 +293,8 @@ TEST(HeatSheet, ASectionShowsWhereItWasHot) {
   EXPECT_NE(html.find("ball"), std::string::npos);
   EXPECT_EQ(pictures_of_html(html).size(), 3U);
   EXPECT_NE(html.find("Nothing clinical"), std::string::npos);
+  // How far a figure can be trusted stands beside it.
+  EXPECT_NE(html.find("right within 1 %, two cells (1 mm)"), std::string::npos);
   // Nothing drilled, nothing warm: said so.
   const HeatReader idle(world, nullptr, 1000);
   const std::string cool = sheet_html(review::heat_sheet(idle, nullptr, {}, "idle"));

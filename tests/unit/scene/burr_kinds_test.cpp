@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "folders.h"
 #include "osteo/simulation/bone/burr.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/vibration.h"
@@ -23,7 +24,7 @@ TEST(BurrKinds, AreNotComparedOutsideTheirTable) {
       R"([=!]=\s*BurrKind::|BurrKind::\w+\s*([=!]=|\?)|case\s+BurrKind::|using enum BurrKind|\{BurrKind::\w+,\s*BurrKind::)");
   int files = 0;
   for (const char* const top : {"libs", "apps"}) {
-    for (const fs::directory_entry& e : fs::recursive_directory_iterator(fs::path(OSTEO_SOURCE) / top)) {
+    for (const fs::directory_entry& e : fs::recursive_directory_iterator(source_folder() / top)) {
       if (e.path().extension() != ".h" && e.path().extension() != ".cpp") continue;
       if (e.path().filename() == "burr_kind.h") continue;
       std::ifstream file(e.path());

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "folders.h"
 #include "osteo/geometry/grid/resample.h"
 #include "osteo/imaging/dicom/import.h"
 #include "osteo/imaging/image/phantom.h"
@@ -206,8 +207,7 @@ TEST(PathPlanner, FromSixViewsWithStructuresAtRisk) {
 }
 
 TEST(PathPlanner, FromSixViewsOnAHead) {
-  const std::filesystem::path file =
-      std::filesystem::path(OSTEO_SHARED_DATA) / "ct_head_unc/CThead_HU_256x256x113_derived.nrrd";
+  const std::filesystem::path file = shared_data() / "ct_head_unc/CThead_HU_256x256x113_derived.nrrd";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file;
   ImportParams p;
   p.axes = "LPI";
@@ -215,7 +215,7 @@ TEST(PathPlanner, FromSixViewsOnAHead) {
 }
 
 TEST(PathPlanner, FromSixViewsOnASkull) {
-  const std::filesystem::path folder = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom/S21570/S2030";
+  const std::filesystem::path folder = shared_data() / "dicom_ct_skull_phantom/S21570/S2030";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no " << folder;
   from_six_views("CT of a skull", world_of(import_ct(folder, {}).image, 300, 1));
 }

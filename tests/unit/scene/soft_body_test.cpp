@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "bar.h"
+#include "folders.h"
 #include "osteo/core/base/error.h"
 #include "osteo/session/recording/session_file.h"
 #include "osteo/session/scene/rehearsal.h"
@@ -207,8 +208,7 @@ TEST(SoftBody, ACaseThatListsItByHalvesIsRefused) {
   const test::ScratchFolder scratch;
   const auto& folder = scratch.path();
   EXPECT_EQ(soft_tissue_of(folder), nullptr);
-  std::filesystem::copy_file(std::filesystem::path(OSTEO_SOURCE) / "pipelines/tissue/gear.json",
-                             folder / "tissue.json");
+  std::filesystem::copy_file(source_folder() / "pipelines/tissue/gear.json", folder / "tissue.json");
   EXPECT_THROW(static_cast<void>(soft_tissue_of(folder)), Error);
 }
 

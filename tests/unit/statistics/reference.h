@@ -6,13 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "folders.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 
 namespace osteo::statistics {
 
 inline Json reference(const std::string& name) {
-  return Json::parse(read_text(std::string(OSTEO_SOURCE) + "/testdata/statistics/" + name + ".json")).value();
+  return Json::parse(read_text(source_folder().string() + "/testdata/statistics/" + name + ".json")).value();
 }
 inline double number(const Json& j) {
   return j.number().value_or(std::nan(""));

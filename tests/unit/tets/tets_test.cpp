@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "folders.h"
 #include "meshes.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/data/tet_mesh.h"
@@ -172,7 +173,7 @@ TEST(Meshes, SameBytesForAnyThreads) {
 
 TEST(Meshes, RealOnes) {
   const auto paths = test::real_meshes();
-  if (paths.empty()) GTEST_SKIP() << "no real meshes in " << OSTEO_SHARED_DATA;
+  if (paths.empty()) GTEST_SKIP() << "no real meshes in " << shared_data();
   for (const auto& path : paths) {
     const std::string name = path.filename().string();
     // Flat drawings enclose nothing, and this aircraft's skin is a ten-thousandth of its length.

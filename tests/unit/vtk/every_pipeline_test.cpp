@@ -6,6 +6,7 @@
 #include <fstream>
 #include <regex>
 
+#include "folders.h"
 #include "osteo/app/stages/registry.h"
 #include "osteo/app/vtk/pipeline.h"
 #include "osteo/core/base/files.h"
@@ -50,7 +51,7 @@ const Inputs& inputs() {
 }
 
 std::map<std::string, Settings> table() {
-  const std::string f = inputs().folder.path().string(), source = OSTEO_SOURCE;
+  const std::string f = inputs().folder.path().string(), source = source_folder().string();
   const std::string ct = f + "/ct.nrrd", gear = source + "/testdata/gear.stl";
   return {
       {"temporal-bone", {{"source", ct}, {"lower", "500"}, {"spacing_mm", "1.5"}}},
@@ -93,7 +94,7 @@ std::string text_of(const fs::path& file) {
 // Of pipelines/ and what is below, all that 'osteo run' takes.
 std::vector<fs::path> pipeline_files() {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::recursive_directory_iterator(fs::path(OSTEO_SOURCE) / "pipelines")) {
+  for (const auto& entry : fs::recursive_directory_iterator(source_folder() / "pipelines")) {
     if (entry.path().extension() == ".json" && text_of(entry.path()).find("\"osteotome\": 1") != std::string::npos)
       files.push_back(entry.path());
   }

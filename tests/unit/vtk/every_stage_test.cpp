@@ -17,6 +17,7 @@
 #include <fstream>
 
 #include "edit.h"
+#include "folders.h"
 #include "osteo/app/stages/mesh.h"
 #include "osteo/app/stages/registry.h"
 #include "osteo/app/vtk/vtkOsteoDataObject.h"
@@ -306,7 +307,7 @@ TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
     const auto text = recipe.texts.find(port.name);
     if (port.kinds.front() == DataKind::source) {
       const fs::path path = GetParam() == "segment-network"
-                                ? fs::path(OSTEO_SOURCE) / "testdata/neural/plain"
+                                ? source_folder() / "testdata/neural/plain"
                                 : values().file(GetParam(), port.name, text == recipe.texts.end() ? "" : text->second);
       inputs.back() = Source{path};
       filter->SetSourcePath(port.name, path.string());

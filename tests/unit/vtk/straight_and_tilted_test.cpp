@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "folders.h"
 #include "osteo/core/base/files.h"
 #include "osteo/geometry/grid/resample.h"
 #include "osteo/geometry/mesh/bone_surface.h"
@@ -112,7 +113,7 @@ Fit register_and_compare(vtkPolyData* tilted, vtkPolyData* straight) {
 class StraightAndTilted : public testing::TestWithParam<SparseGrid (*)(const fs::path&)> {};
 
 TEST_P(StraightAndTilted, AreTheSameShape) {
-  const fs::path data = fs::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom";
+  const fs::path data = shared_data() / "dicom_ct_skull_phantom";
   if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
   const auto straight = surface_of(GetParam()(data / "S21570" / "S2030")),
              tilted = surface_of(GetParam()(data / "S21610" / "S2010"));

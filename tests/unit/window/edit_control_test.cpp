@@ -11,6 +11,7 @@
 
 #include "cut_picture.h"
 #include "edit_subject.h"
+#include "folders.h"
 
 namespace osteo {
 namespace {
@@ -65,7 +66,7 @@ TEST(EditControl, EveryKeyIsToldAndEveryTellingHasAKey) {
 }
 
 TEST(EditControl, TheGuideHasTheTableOfKeys) {
-  std::ifstream in(std::string(OSTEO_SOURCE) + "/docs/guides/edit.md");
+  std::ifstream in(source_folder().string() + "/docs/guides/edit.md");
   std::stringstream text;
   text << in.rdbuf();
   EXPECT_NE(text.str().find(edit_help_table()), std::string::npos) << "docs/guides/edit.md lacks this table:\n"

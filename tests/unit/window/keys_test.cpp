@@ -1,5 +1,6 @@
 // The window's keys, without a window.
 #include "keys.h"
+#include "folders.h"
 
 #include <gtest/gtest.h>
 
@@ -46,7 +47,7 @@ TEST(Keys, UndoSearchAndFocus) {
 }
 
 TEST(Keys, ThePageOfKeysHasEach) {
-  std::ifstream file(OSTEO_SOURCE "/docs/how-to/keys.md");
+  std::ifstream file(source_folder() / "docs/how-to/keys.md");
   std::stringstream text;
   text << file.rdbuf();
   // Of the tables the first column.

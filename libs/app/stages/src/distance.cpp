@@ -244,7 +244,8 @@ StageInfo DistanceAtStage::info() {
           "For each point of a text file (x, y, z in LPS mm a line; commas, blanks or tabs between) the exact distance "
           "to the surface, "
           "negative inside, the closest point and its triangle.",
-      .inputs = {{"surface", {DataKind::surface}, "triangles"}, {"points", {DataKind::source}, "text file of points"}},
+      .inputs = {{"surface", {DataKind::surface}, "triangles"},
+                 {"points", {DataKind::source}, "points: a text file, or .mrk.json or .fcsv of 3D Slicer"}},
       .outputs = {{"distances", {DataKind::document}, "one entry a point, in JSON"}},
       .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3"},
       .example = "osteo distance-at bone.ply points.csv distances.json"};

@@ -42,15 +42,15 @@ namespace {
 // Before it is done, where the planner looks: what is cut through, and what is nearer to a saw than a hand is steady.
 void tell(const PlannedHarm& harm, const Context& context) {
   constexpr double kNearMm = 2;
-  const auto tenths = [](double v) { return format_number(std::round(10 * v) / 10); };
   for (const StructureAtCut& s : harm.at_cuts) {
     if (s.cut_mm3 > 0)
-      context.warn(s.plane + " cuts " + s.structure + " (" + tenths(s.cut_mm3) + " mm\u00b3 in the kerf)");
+      context.warn(s.plane + " cuts " + s.structure + " (" + planning::rounded(s.cut_mm3, 1) +
+                   " mm\u00b3 in the kerf)");
     else if (s.nearest_mm < kNearMm)
-      context.warn(s.plane + " passes " + s.structure + " at " + tenths(s.nearest_mm) + " mm");
+      context.warn(s.plane + " passes " + s.structure + " at " + planning::rounded(s.nearest_mm, 1) + " mm");
   }
   for (const StructureRemoved& s : harm.removed)
-    context.info(tenths(100 * s.share) + " % of " + s.structure + " is in what is removed");
+    context.info(planning::rounded(100 * s.share, 1) + " % of " + s.structure + " is in what is removed");
 }
 
 }  // namespace
@@ -192,26 +192,32 @@ StageInfo OutcomeStage::info() {
   return {
       .name = "outcome",
       .version = 1,
-      .synopsis = "what came of a plan: fragments, cuts, screws and plates in a CT after surgery, with intervals",
+      .synopsis =
+          "what came of a plan: fragments, cuts, contour, condyles, screws and plates in a CT after surgery, "
+          "with intervals",
       .description =
           "Finds each fragment of a plan in a CT after surgery by the edges of its surface, and each cut face where "
-          "the CT shows it. Screws and empty holes of the plan are compared within their fragment, a plate with each "
+          "the CT shows it. The contour is compared with the plan and with the mirrored side, each condyle with where "
+          "the "
+          "plan has it. Screws and empty holes of the plan are compared within their fragment, a plate with each "
           "fragment that it lies on. Deviations are from the plan, with the largest fragment that stays as the "
           "reference, each "
           "with a 95 % interval. What the CT does not show is not known, with the reason: a face that lies upon "
           "other bone, a fragment under metal, screws that merge. The CT must lie within about 20 mm and 12 degrees of "
           "the plan's; "
           "'register' brings it there. For research and training; no medical device.",
-      .inputs = {{"plan", {DataKind::document}, "plan file"},
-                 {"postop", {DataKind::image}, "CT after surgery"},
-                 {"bone",
-                  {DataKind::surface},
-                  "closed surface of the bone that the plan names first, in the plan's CT"},
-                 {"donor", {DataKind::surface}, "closed surface of the plan's other bone", true},
-                 {"plate",
-                  {DataKind::surface},
-                  "closed surface of a metal plate where the plan has it: in the plan's CT, on the fragments as wanted",
-                  true}},
+      .inputs =
+          {{"plan", {DataKind::document}, "plan file"},
+           {"postop", {DataKind::image}, "CT after surgery"},
+           {"bone", {DataKind::surface}, "closed surface of the bone that the plan names first, in the plan's CT"},
+           {"donor",
+            {DataKind::surface},
+            "closed surface of the plan's other bone, of which it takes segments or against which all is measured",
+            true},
+           {"plate",
+            {DataKind::surface},
+            "closed surface of a metal plate where the plan has it: in the plan's CT, on the fragments as wanted",
+            true}},
       .outputs = {{"outcome", {DataKind::document}, "deviations and intervals in JSON"},
                   {"page", {DataKind::document}, "one page to print, in HTML", true}},
       .references =
@@ -240,6 +246,7 @@ Json json_of(const ScrewOutcome& s) {
            {"found", s.found},         {"known", s.known},       {"direction_known", s.direction_known},
            {"tip_known", s.tip_known}, {"seen", s.seen}};
   if (!s.why.empty()) one["why"] = s.why;
+  if (!s.finding.empty()) one["finding"] = s.finding;
   if (!(s.slides_along == Vec3{})) one["slides_along"] = osteo::json_of(s.slides_along);
   if (s.known) one["entry_mm"] = json_of(s.entry_mm);
   if (s.tip_known) one["tip_mm"] = json_of(s.tip_mm);
@@ -252,6 +259,37 @@ Json json_of(const ScrewOutcome& s) {
   return one;
 }
 
+// Of a fragment, a plate or a condyle.
+void add_pose(Json& to, const FragmentOutcome& f) {
+  if (!(f.slides_along == Vec3{})) to["slides_along"] = osteo::json_of(f.slides_along);
+  to["shift_mm"] = json_of(f.shift_mm);
+  to["turn_deg"] = json_of(f.turn_deg);
+}
+
+Json json_of(const ContourOutcome& c) {
+  Json one{{"against", c.against}, {"known", c.known}};
+  if (!c.known) {
+    one["why"] = c.why;
+    return one;
+  }
+  one["mean_mm"] = json_of(c.mean_mm);
+  one["p95_mm"] = json_of(c.p95_mm);
+  one["planned_mean_mm"] = c.planned_mean_mm;
+  one["planned_p95_mm"] = c.planned_p95_mm;
+  return one;
+}
+
+Json json_of(const CondyleOutcome& c) {
+  Json one{{"side", c.side}, {"fragment", c.pose.name}, {"known", c.pose.known}};
+  if (!c.pose.known) {
+    one["why"] = c.pose.why;
+    return one;
+  }
+  one["middle_mm"] = osteo::json_of(c.pose.middle_mm);
+  add_pose(one, c.pose);
+  return one;
+}
+
 Json outcome_json(const Outcome& o) {
   Json j{{"osteotome_outcome", 1}, {"intended_use", "research, teaching and rehearsal; not a medical device"}};
   j["fragments"] = Json::list();
@@ -261,11 +299,7 @@ Json outcome_json(const Outcome& o) {
     if (f.known) {
       one["middle_mm"] = osteo::json_of(f.middle_mm);
       one["edge_rms_mm"] = f.edge_mm;
-      if (!f.reference) {
-        if (!(f.slides_along == Vec3{})) one["slides_along"] = osteo::json_of(f.slides_along);
-        one["shift_mm"] = json_of(f.shift_mm);
-        one["turn_deg"] = json_of(f.turn_deg);
-      }
+      if (!f.reference) add_pose(one, f);
     }
     j["fragments"].push_back(std::move(one));
   }
@@ -282,6 +316,10 @@ Json outcome_json(const Outcome& o) {
     }
     j["cuts"].push_back(std::move(one));
   }
+  j["contours"] = Json::list();
+  for (const ContourOutcome& c : o.contours) j["contours"].push_back(json_of(c));
+  j["condyles"] = Json::list();
+  for (const CondyleOutcome& c : o.condyles) j["condyles"].push_back(json_of(c));
   if (!o.screws.empty()) j["screws"] = Json::list();
   for (const ScrewOutcome& s : o.screws) j["screws"].push_back(json_of(s));
   if (!o.plates.empty()) j["plates"] = Json::list();
@@ -290,9 +328,7 @@ Json outcome_json(const Outcome& o) {
     if (!p.pose.known) one["why"] = p.pose.why;
     if (p.pose.known) {
       one["middle_mm"] = osteo::json_of(p.pose.middle_mm);
-      if (!(p.pose.slides_along == Vec3{})) one["slides_along"] = osteo::json_of(p.pose.slides_along);
-      one["shift_mm"] = json_of(p.pose.shift_mm);
-      one["turn_deg"] = json_of(p.pose.turn_deg);
+      add_pose(one, p.pose);
     }
     j["plates"].push_back(std::move(one));
   }
@@ -300,8 +336,7 @@ Json outcome_json(const Outcome& o) {
 }
 
 std::string text_of(const Interval95& m) {
-  const auto hundredths = [](double v) { return format_number(std::round(100 * v) / 100); };
-  return hundredths(m.value) + " \u00b1 " + hundredths(m.half);
+  return planning::rounded(m.value, 2) + " \u00b1 " + planning::rounded(m.half, 2);
 }
 
 std::string text_of(const std::array<Interval95, 3>& all) {
@@ -315,11 +350,39 @@ sheet::Cell not_known(const std::string& why) {
   return {"not known: " + why, Tone::caution};
 }
 
+sheet::Table contours_table(const std::vector<ContourOutcome>& contours) {
+  sheet::Table t{
+      {"Contour against", "mean (mm)", "95 % within (mm)", "as planned: mean, 95 % (mm)"}, {}, {0.22, 0.24, 0.24, 0.3}};
+  for (const ContourOutcome& c : contours) {
+    if (c.known)
+      t.rows.push_back(
+          {plain("the " + c.against), plain(text_of(c.mean_mm)), plain(text_of(c.p95_mm)),
+           plain(planning::rounded(c.planned_mean_mm, 2) + "; " + planning::rounded(c.planned_p95_mm, 2))});
+    else
+      t.rows.push_back({plain("the " + c.against), not_known(c.why), plain(""), plain("")});
+  }
+  return t;
+}
+
+sheet::Table condyles_table(const std::vector<CondyleOutcome>& condyles) {
+  sheet::Table t{{"Condyle", "shift x, y, z (mm)", "turn x, y, z (degrees)"}, {}, {0.3, 0.35, 0.35}};
+  for (const CondyleOutcome& c : condyles) {
+    std::string name = c.side + (c.pose.name.empty() ? "" : " (" + c.pose.name + ")");
+    if (!(c.pose.slides_along == Vec3{})) name += " (not known along its fragment)";
+    if (c.pose.known)
+      t.rows.push_back({plain(name), plain(text_of(c.pose.shift_mm)), plain(text_of(c.pose.turn_deg))});
+    else
+      t.rows.push_back({plain(name), not_known(c.pose.why), plain("")});
+  }
+  return t;
+}
+
 sheet::Table screws_table(const std::vector<ScrewOutcome>& screws) {
   sheet::Table t{{"Screw", "entry x, y, z (mm)", "tip x, y, z (mm)", "tilt (degrees)"}, {}, {0.16, 0.32, 0.32, 0.2}};
   for (const ScrewOutcome& s : screws) {
     std::string name = s.name + (s.empty ? " (empty hole)" : "");
     if (!(s.slides_along == Vec3{})) name += " (not known along its fragment)";
+    if (!s.finding.empty()) name += " (" + s.finding + ")";
     if (!s.found || !(s.known || s.tip_known || s.direction_known)) {
       t.rows.push_back({plain(name), s.found ? not_known(s.why) : sheet::Cell{"not found: " + s.why, Tone::caution},
                         plain(""), plain("")});
@@ -334,10 +397,10 @@ sheet::Table screws_table(const std::vector<ScrewOutcome>& screws) {
 }
 
 sheet::Table plates_table(const std::vector<PlateOutcome>& plates) {
-  sheet::Table t{{"Plate against", "shift x, y, z (mm)", "turn x, y, z (degrees)"}, {}, {0.3, 0.35, 0.35}};
+  sheet::Table t{{"Plate", "shift x, y, z (mm)", "turn x, y, z (degrees)"}, {}, {0.3, 0.35, 0.35}};
   for (const PlateOutcome& p : plates) {
     const bool slides = !(p.pose.slides_along == Vec3{});
-    std::string name = p.against + (slides ? " (not known along it)" : "");
+    const std::string name = p.pose.name + " against " + p.against + (slides ? " (not known along it)" : "");
     if (p.pose.known)
       t.rows.push_back({plain(name), plain(text_of(p.pose.shift_mm)), plain(text_of(p.pose.turn_deg))});
     else
@@ -385,6 +448,14 @@ std::string outcome_page(const Outcome& o) {
   s.blocks.push_back({std::move(fragments)});
   s.blocks.push_back({sheet::Heading{"Cuts"}});
   s.blocks.push_back({std::move(cuts)});
+  s.blocks.push_back({sheet::Heading{"Contour"}});
+  s.blocks.push_back({contours_table(o.contours)});
+  s.blocks.push_back({sheet::Paragraph{
+      "How far the surface of what the plan moves is from where the plan has it; how far the lower border of the "
+      "mirrored side is from the axes of the segments that rebuild it. A mirrored side is no truth of how the bone "
+      "was."}});
+  s.blocks.push_back({sheet::Heading{"Condyles"}});
+  s.blocks.push_back({condyles_table(o.condyles)});
   if (!o.screws.empty()) {
     s.blocks.push_back({sheet::Heading{"Screws"}});
     s.blocks.push_back({screws_table(o.screws)});
@@ -410,8 +481,11 @@ std::vector<Data> OutcomeStage::run(const Params& params, std::span<const Data> 
   };
   const std::string& first = plan.planes.front().bone;
   add(first, inputs[2]);
-  for (const CutPlane& p : plan.planes)
-    if (p.bone != first && bones.size() == 1) add(p.bone, inputs[3]);
+  const auto add_other = [&](const std::string& bone) {
+    if (bone != first && bones.size() == 1) add(bone, inputs[3]);
+  };
+  for (const CutPlane& p : plan.planes) add_other(p.bone);
+  for (const PlannedFragment& f : plan.fragments) add_other(f.bone);
   if (const auto* plate = std::get_if<Surface>(&inputs[4]))
     plan.plates.push_back({"plate", compacted(welded(soup_of(**plate)))});
   const Outcome o = measure_outcome(plan, bones, std::get<Image>(inputs[1]), params, context);

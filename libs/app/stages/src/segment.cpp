@@ -55,7 +55,10 @@ StageInfo TubeStage::info() {
           "the points. Points that no tube joins are rejected. docs/validation/structures.md has how far off it is.",
       .inputs =
           {{"image", {DataKind::image}, "CT in HU"},
-           {"points", {DataKind::source}, "text file, a point x, y, z (LPS mm) a line; in place of --points-mm", true},
+           {"points",
+            {DataKind::source},
+            "text file, a point x, y, z (LPS mm) a line, or .mrk.json or .fcsv of 3D Slicer; in place of --points-mm",
+            true},
            {"labels", {DataKind::labels}, "label map of this CT to which it is added", true}},
       .outputs = {{"structures", {DataKind::labels}, "label map with the tube"},
                   {"line",

@@ -16,8 +16,10 @@ StageInfo VirtualFixtureStage::info() {
               "curve that minimises "
               "distance "
               "plus a penalty on the way from the last place, found exactly, and the spring's force.",
-          .inputs = {{"curve", {DataKind::source}, "text file of the curve's points in order"},
-                     {"path", {DataKind::source}, "text file of the hand's positions in order"}},
+          .inputs = {{"curve",
+                      {DataKind::source},
+                      "the curve's points in order: a text file, or .mrk.json or .fcsv of 3D Slicer"},
+                     {"path", {DataKind::source}, "the hand's positions in order, likewise"}},
           .outputs = {{"places", {DataKind::document}, "one entry a position, in JSON"}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.2"},
           .example = "osteo virtual-fixture incision.csv hand.csv places.json --arc-penalty 0.3"};

@@ -34,6 +34,16 @@ std::string state_of(const fs::path& folder) {
   return hash_text(std::to_string(kPicturesVersion) + case_hash(folder));
 }
 
+// What 'osteo outcome' wrote into the case; empty where it did not.
+std::string outcome_of(const fs::path& folder) {
+  const fs::path file = folder / "outcome.json";
+  return output_exists(file) ? read_text(file) : std::string();
+}
+std::string outcome_mark(const fs::path& folder) {
+  const std::string json = outcome_of(folder);
+  return json.empty() ? json : hash_text(json).substr(0, 16);
+}
+
 std::string earlier_html(const fs::path& folder) {
   const fs::path html = report_file(folder, ".html");
   std::error_code ec;
@@ -305,6 +315,8 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
   add_threshold_and_removed(s, c);
   add_thin_bone_and_resolution(s, c);
   add_structures(s, c);
+  if (const std::string outcome = outcome_of(folder); !outcome.empty())
+    for (SheetBlock& block : outcome_blocks(outcome)) s.blocks.push_back(std::move(block));
   add_how_made(s, folder, c, asked_for, left_out);
   s.blocks.push_back({signature_of(folder)});
   return s;
@@ -370,7 +382,8 @@ std::vector<std::pair<std::string, std::string>> case_facts(const fs::path& fold
 
 bool report_shows(const fs::path& folder) {
   const std::string html = earlier_html(folder);
-  return !html.empty() && mark_of_html(html, "state") == state_of(folder);
+  return !html.empty() && mark_of_html(html, "state") == state_of(folder) &&
+         mark_of_html(html, "outcome") == outcome_mark(folder);
 }
 
 bool has_full_report(const fs::path& folder) {
@@ -385,8 +398,8 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
   context.progress(0, "report");
   const std::string earlier_language = mark_of_html(earlier_html(folder), "language");
   const bool same_language = language_named(earlier_language.empty() ? "en" : earlier_language) == language();
-  if (approval_of(folder).state == ApprovalState::valid && has_full_report(folder) && same_language &&
-      earlier_html(folder).find("class=\"signature good\"") != std::string::npos) {
+  if (approval_of(folder).state == ApprovalState::valid && has_full_report(folder) && report_shows(folder) &&
+      same_language && earlier_html(folder).find("class=\"signature good\"") != std::string::npos) {
     report.unchanged = true;
     return report;
   }
@@ -412,6 +425,7 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
   s.marks["state"] = state;
   if (language() != Language::english)
     s.marks["language"] = enum_names(Language{})[static_cast<std::size_t>(language())];
+  if (const std::string mark = outcome_mark(folder); !mark.empty()) s.marks["outcome"] = mark;
   s.marks["left-out"] = report.left_out.empty() ? "" : "scan";
   if (c.thin_percent >= 0) s.marks["thin-percent"] = format_number(std::round(100 * c.thin_percent) / 100);
   context.progress(0.9, "report: pages");

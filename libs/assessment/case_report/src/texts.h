@@ -47,6 +47,9 @@ using Rows = std::vector<std::pair<std::string, std::string>>;
 [[nodiscard]] sheet::Table structure_table(const std::vector<StructureMeasure>& measures);
 /// Of the sizes that the table calls usual.
 [[nodiscard]] std::string sources_of(const std::vector<StructureMeasure>& measures);
+/// Of the text of a file of 'osteo outcome': fragments, condyles, cuts and contours, each with its interval or why it
+/// is not known.
+[[nodiscard]] SheetBlocks outcome_blocks(const std::string& json);
 /// How many voxels small structures have, and what that means.
 [[nodiscard]] sheet::Table resolution_table(const CaseFacts& facts);
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -12,19 +11,16 @@
 #include "osteo/core/base/portable_math.h"
 #include "osteo/core/base/union_find.h"
 #include "osteo/geometry/distance/voxelize.h"
+#include "turns_tree.h"
 #include "winding.h"
+#include "winding_at.h"
 
 namespace osteo::inline geometry {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-// Triangles with the same corners, as one.
-struct Layer {
-  Triangle corners;
-  int net;  // how many more face as `corners` does than the other way
-};
-
+// Triangles with the same corners, as one: as many as face one way more than the other.
 std::vector<Layer> layers_of(const TriangleSoup& soup) {
   std::vector<std::pair<Triangle, std::uint32_t>> by_corners;
   for (std::uint32_t i = 0; i < soup.triangles.size(); ++i) {
@@ -74,7 +70,11 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
   SolidSurface result;
   result.soup = welded(input);
   // What no order closes is put in order first, or it would be as many patches as triangles.
-  if (!is_closed(result.soup)) result.soup = ordered(input, context).soup;
+  Ordered mended;
+  if (!is_closed(result.soup)) {
+    mended = ordered(input, context);
+    result.soup = mended.soup;
+  }
   const auto& points = result.soup.points_mm;
   const std::vector<Layer> layers = layers_of(result.soup);
   const auto corner = [&](const Layer& s, std::size_t i) { return points[s.corners[i]]; };
@@ -108,58 +108,97 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
     std::vector<std::uint32_t> layers;
     std::uint32_t largest = 0;
     double most = -1;
-    Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+    BoxMm box;
     bool closed = true;  // by itself: nothing outside of its box is within it
   };
-  std::map<std::uint32_t, Patch> patches;
-  for (std::uint32_t s = 0; s < layers.size(); ++s) {
-    const double area =
-        length(cross(corner(layers[s], 1) - corner(layers[s], 0), corner(layers[s], 2) - corner(layers[s], 0)));
-    Patch& patch = patches[root_of(parent, s)];
-    patch.layers.push_back(s);
-    patch.closed = patch.closed && !at_border[s];
-    if (area > patch.most) patch.largest = s, patch.most = area;
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        patch.lo[axis] = std::min(patch.lo[axis], corner(layers[s], i)[axis]);
-        patch.hi[axis] = std::max(patch.hi[axis], corner(layers[s], i)[axis]);
+  std::vector<Patch> patches;
+  std::vector<std::uint32_t> patch_of(layers.size());
+  {
+    constexpr std::uint32_t kUnnumbered = 0xffffffffU;
+    std::vector<std::uint32_t> number(layers.size(), kUnnumbered);  // by root
+    for (std::uint32_t s = 0; s < layers.size(); ++s) {
+      std::uint32_t& n = number[root_of(parent, s)];
+      if (n == kUnnumbered) {
+        n = static_cast<std::uint32_t>(patches.size());
+        patches.emplace_back();
       }
+      patch_of[s] = n;
+      Patch& patch = patches[n];
+      const double area =
+          length(cross(corner(layers[s], 1) - corner(layers[s], 0), corner(layers[s], 2) - corner(layers[s], 0)));
+      patch.layers.push_back(s);
+      patch.closed = patch.closed && !at_border[s];
+      if (area > patch.most) patch.largest = s, patch.most = area;
+      for (std::size_t i = 0; i < 3; ++i) patch.box.include(corner(layers[s], i));
     }
   }
-  enum class Verdict : std::uint8_t { drop, keep, turn };
-  std::map<std::uint32_t, Verdict> of_patch;
-  for (const auto& [number, patch] : patches) {
-    context.check_cancelled();
+  std::vector<PlaceOn> places;
+  for (const Patch& patch : patches) {
     const Layer& own = layers[patch.largest];
-    const Vec3 p = corner(own, 0) * 0.37 + corner(own, 1) * 0.33 + corner(own, 2) * 0.30;
+    places.push_back({patch.largest, corner(own, 0) * 0.37 + corner(own, 1) * 0.33 + corner(own, 2) * 0.30});
+  }
+  // How often the surface winds around what lies right behind each place: whole numbers by rays, for a surface that
+  // fans close, less the turns of these.
+  const std::vector<Fan> fans = closing_fans(mended, points);
+  const TurnsTree fan_tree(fans);
+  const auto windings = [&] {
+    if (fans.empty()) return windings_behind(points, layers, places, context);
+    std::vector<Vec3> all_points = points;
+    std::vector<Layer> all_layers = layers;
+    for (const Fan& fan : fans) {
+      const auto at = static_cast<std::uint32_t>(all_points.size());
+      all_points.insert(all_points.end(), {fan.a, fan.b, fan.c});
+      all_layers.push_back({{at, at + 1, at + 2}, fan.weight});
+    }
+    return windings_behind(all_points, all_layers, places, context);
+  }();
+  // Where rays give no answer: the sum of all solid angles, in which a triangle that holds the place makes no turn.
+  const auto sum_at = [&](std::size_t number) {
+    const Patch& patch = patches[number];
+    const Vec3 p = places[number].at;
     // By more than rounding: faces that lie on each other are looked at.
     const auto apart_from = [&](const Patch& other) {
       bool outside = false;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double slack = 1e-9 * (std::abs(other.lo[axis]) + std::abs(other.hi[axis]) + std::abs(p[axis]));
-        outside = outside || p[axis] < other.lo[axis] - slack || p[axis] > other.hi[axis] + slack;
+        const double slack = 1e-9 * (std::abs(other.box.lo[axis]) + std::abs(other.box.hi[axis]) + std::abs(p[axis]));
+        outside = outside || p[axis] < other.box.lo[axis] - slack || p[axis] > other.box.hi[axis] + slack;
       }
       return outside;
     };
     double others = 0;
-    for (const auto& [its_number, other] : patches) {
-      if (its_number != number && other.closed && apart_from(other)) continue;
+    for (const Patch& other : patches) {
+      if (&other != &patch && other.closed && apart_from(other)) continue;
       for (const std::uint32_t s : other.layers) {
         if (s != patch.largest && layers[s].net != 0)
           others +=
               layers[s].net * corner_solid_angle(corner(layers[s], 0), corner(layers[s], 1), corner(layers[s], 2), p);
       }
     }
-    const double behind = others + own.net / 2.0, before = others - own.net / 2.0;
-    const auto inside = [](double w) { return std::abs(w) > 0.5; };
-    of_patch[number] = inside(behind) == inside(before) ? Verdict::drop
-                       : inside(behind)                 ? Verdict::keep
-                                                        : Verdict::turn;
+    return others + layers[patch.largest].net / 2.0;
+  };
+  enum class Verdict : std::uint8_t { drop, keep, turn };
+  std::vector<Verdict> verdict_of;
+  const auto inside = [](double w) { return std::abs(w) > 0.5; };
+  for (std::size_t number = 0; number < patches.size(); ++number) {
+    context.check_cancelled();
+    const int net = layers[patches[number].largest].net;
+    double behind = 0;
+    bool decided = windings[number].has_value();
+    if (decided) {
+      const TurnsTree::Turns turns = fan_tree.turns(places[number].at, 1e-6);
+      behind = *windings[number] - turns.value;
+      for (const double w : {behind, behind - net})
+        decided = decided && std::abs(std::abs(w) - 0.5) > turns.error + 1e-9;
+    }
+    if (!decided) behind = sum_at(number);
+    verdict_of.push_back(inside(behind) == inside(behind - net) ? Verdict::drop
+                         : inside(behind)                       ? Verdict::keep
+                                                                : Verdict::turn);
   }
   result.soup.triangles.clear();
   for (std::uint32_t s = 0; s < layers.size(); ++s) {
     Triangle t = layers[s].corners;
-    const Verdict v = of_patch.at(root_of(parent, s));
+    const Verdict v = verdict_of[patch_of[s]];
     if (v == Verdict::drop) {
       ++result.buried;
       continue;

@@ -55,16 +55,27 @@ struct LevelCut {
   return result;
 }
 
-/// +1 or -1 when the ray that comes along x to p enters or leaves through the triangle, else 0.
-[[nodiscard]] inline int crossing_before(const Vec3& a, const Vec3& b, const Vec3& c, Vec3 p) {
+/// Where the line along x through p passes a triangle: +1 where it enters what the triangle bounds, -1 where it leaves,
+/// 0 where it passes beside.
+struct LineCrossing {
+  int turns = 0;
+  double at = 0;  ///< x
+};
+[[nodiscard]] inline LineCrossing crossing_of_line(const Vec3& a, const Vec3& b, const Vec3& c, Vec3 p) {
   const LevelCut s = cut(a, b, c, p.z);
-  if (!s.any) return 0;
+  if (!s.any) return {};
   const bool leaves = s.y[0] > s.y[1];
   const double y0 = leaves ? s.y[1] : s.y[0], y1 = leaves ? s.y[0] : s.y[1];
-  if (!(y0 <= p.y && p.y < y1)) return 0;
+  if (!(y0 <= p.y && p.y < y1)) return {};
   const double x0 = leaves ? s.x[1] : s.x[0], x1 = leaves ? s.x[0] : s.x[1];
   const double x = std::clamp(x0 + (p.y - y0) * ((x1 - x0) / (y1 - y0)), std::min(x0, x1), std::max(x0, x1));
-  return x <= p.x ? (leaves ? -1 : 1) : 0;
+  return {leaves ? -1 : 1, x};
+}
+
+/// +1 or -1 when the ray that comes along x to p enters or leaves through the triangle, else 0.
+[[nodiscard]] inline int crossing_before(const Vec3& a, const Vec3& b, const Vec3& c, Vec3 p) {
+  const LineCrossing x = crossing_of_line(a, b, c, p);
+  return x.turns != 0 && x.at <= p.x ? x.turns : 0;
 }
 
 }  // namespace osteo::inline geometry

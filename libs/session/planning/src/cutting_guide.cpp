@@ -155,7 +155,7 @@ void merge_openings(GuideLayout& l, const std::vector<CutPlane>& planes, const A
                   "put the guide on from the other side (--approach), or make a guide for each (--planes)");
     if (room < kerf)
       context.warn("the opening between " + both + " is narrower than the blade in one corner: " +
-                   format_number(std::round(100 * room) / 100) + " mm; the saw enters from its wide side");
+                   planning::rounded(room, 2) + " mm; the saw enters from its wide side");
     out.back() = merged;
   }
   l.openings = std::move(out);
@@ -378,9 +378,8 @@ PrintedGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& pl
                 "another --approach, a larger --depth-mm or --margin-mm");
   for (const GuideCut& c : out.cuts)
     if (c.play_deg > guide::kMostPlayDeg)
-      context.warn("in the slot of '" + c.plane + "' the blade can tilt by " +
-                   format_number(std::round(10 * c.play_deg) / 10) + " degrees: its faces are " +
-                   format_number(std::round(10 * length(c.slot_up_mm)) / 10) +
+      context.warn("in the slot of '" + c.plane + "' the blade can tilt by " + planning::rounded(c.play_deg, 1) +
+                   " degrees: its faces are " + planning::rounded(length(c.slot_up_mm), 1) +
                    " mm high; a larger --wall-mm or a smaller --play-mm keeps it straighter");
   context.progress(0.8, "seat");
   guide::rock(block, planes, axes, out.cuts);

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <utility>
 
+#include "osteo/core/base/error.h"
 #include "osteo/core/base/portable_math.h"
 #include "solve.h"
 
@@ -15,6 +17,11 @@ namespace {
 constexpr std::size_t kPlaces = 2000;
 constexpr double kFromCutsMm = 2;
 
+double area_of(const TriangleSoup& s, const std::array<std::uint32_t, 3>& t) {
+  const Vec3 a = s.points_mm[t[0]];
+  return length(cross(s.points_mm[t[1]] - a, s.points_mm[t[2]] - a)) / 2;
+}
+
 bool behind(const std::vector<const CutPlane*>& planes, Vec3 p, double by) {
   return std::all_of(planes.begin(), planes.end(), [&](const CutPlane* c) {
     return dot(p - c->at_mm, c->normal) * (c->waste_ahead ? 1 : -1) <= -by;
@@ -23,33 +30,66 @@ bool behind(const std::vector<const CutPlane*>& planes, Vec3 p, double by) {
 
 // Triangles of what stays: behind the planes, and in one piece with what is nearest to the first one's place. Planes go
 // on beyond the bone's section: behind one across the left of a jaw also lies the right ramus, which is another's.
+// Without planes, of all pieces that of most area.
 std::vector<bool> part(const TriangleSoup& bone, const std::vector<const CutPlane*>& planes) {
-  std::vector<std::uint32_t> piece(bone.points_mm.size());
+  std::vector<bool> in(bone.triangles.size());
+  std::vector<double> nearness(bone.triangles.size());
+  for (std::size_t n = 0; n < in.size(); ++n) {
+    const auto& t = bone.triangles[n];
+    const Vec3 middle = (bone.points_mm[t[0]] + bone.points_mm[t[1]] + bone.points_mm[t[2]]) / 3;
+    in[n] = behind(planes, middle, kFromCutsMm);
+    if (!planes.empty()) nearness[n] = -length(middle - planes[0]->at_mm);
+  }
+  const std::vector<std::uint32_t> piece = pieces_of(bone, in);
+  if (planes.empty()) {
+    std::vector<double> area(bone.triangles.size());
+    for (std::size_t n = 0; n < in.size(); ++n) area[piece[n]] += area_of(bone, bone.triangles[n]);
+    for (std::size_t n = 0; n < in.size(); ++n) nearness[n] = area[piece[n]];
+  }
+  std::size_t wanted = in.size();
+  for (std::size_t n = 0; n < in.size(); ++n)
+    if (in[n] && (wanted == in.size() || nearness[n] > nearness[wanted])) wanted = n;
+  for (std::size_t n = 0; n < in.size(); ++n) in[n] = in[n] && piece[n] == piece[wanted];
+  return in;
+}
+
+}  // namespace
+
+const TriangleSoup& bone_called(const std::vector<std::pair<std::string, TriangleSoup>>& bones,
+                                const std::string& name) {
+  for (const auto& [called, bone] : bones)
+    if (called == name) return bone;
+  throw Error(ExitCode::usage, "the plan has fragments of the '" + name + "', whose surface is not given",
+              "give the surface of each bone that the plan cuts");
+}
+
+std::vector<std::uint32_t> pieces_of(const TriangleSoup& s, const std::vector<bool>& in) {
+  std::vector<std::uint32_t> piece(s.points_mm.size());
   for (std::size_t n = 0; n < piece.size(); ++n) piece[n] = static_cast<std::uint32_t>(n);
   const auto root = [&](std::uint32_t n) {
     while (piece[n] != n) n = piece[n] = piece[piece[n]];
     return n;
   };
-  std::vector<bool> in(bone.triangles.size());
-  double nearest = std::numeric_limits<double>::infinity();
-  std::uint32_t wanted = 0;
   for (std::size_t n = 0; n < in.size(); ++n) {
-    const auto& t = bone.triangles[n];
-    const Vec3 middle = (bone.points_mm[t[0]] + bone.points_mm[t[1]] + bone.points_mm[t[2]]) / 3;
-    in[n] = behind(planes, middle, kFromCutsMm);
     if (!in[n]) continue;
+    const auto& t = s.triangles[n];
     piece[root(t[1])] = root(t[0]);
     piece[root(t[2])] = root(t[0]);
-    const double mm = planes.empty() ? 0 : length(middle - planes[0]->at_mm);
-    if (mm >= nearest) continue;
-    nearest = mm;
-    wanted = t[0];
   }
-  for (std::size_t n = 0; n < in.size(); ++n) in[n] = in[n] && root(bone.triangles[n][0]) == root(wanted);
-  return in;
+  std::vector<std::uint32_t> number(s.points_mm.size(), std::numeric_limits<std::uint32_t>::max()), out(in.size());
+  std::uint32_t count = 0;
+  for (std::size_t n = 0; n < in.size(); ++n) {
+    if (!in[n]) continue;
+    std::uint32_t& of = number[root(s.triangles[n][0])];
+    if (of == std::numeric_limits<std::uint32_t>::max()) of = count++;
+    out[n] = of;
+  }
+  return out;
 }
 
-}  // namespace
+bool stays(const PlannedFragment& f) {
+  return f.planned_from_ct.rotation == Mat3{} && f.planned_from_ct.shift_mm == Vec3{};
+}
 
 // Spread over the area of what stays, by the golden ratio; the same every time.
 std::vector<SurfacePlace> spread(const TriangleSoup& bone, const std::vector<const CutPlane*>& planes) {
@@ -59,9 +99,7 @@ std::vector<SurfacePlace> spread(const TriangleSoup& bone, const std::vector<con
   const std::vector<bool> in = part(bone, planes);
   for (std::size_t n = 0; n < bone.triangles.size(); ++n) {
     if (!in[n]) continue;
-    const auto& t = bone.triangles[n];
-    const Vec3 a = bone.points_mm[t[0]], b = bone.points_mm[t[1]], c = bone.points_mm[t[2]];
-    until.push_back(sum += length(cross(b - a, c - a)) / 2);
+    until.push_back(sum += area_of(bone, bone.triangles[n]));
     of.push_back(n);
   }
   std::vector<SurfacePlace> out;
@@ -77,7 +115,7 @@ std::vector<SurfacePlace> spread(const TriangleSoup& bone, const std::vector<con
       v = 1 - v;
     }
     const Vec3 a = bone.points_mm[t[0]], b = bone.points_mm[t[1]], c = bone.points_mm[t[2]];
-    out.push_back({a + (b - a) * u + (c - a) * v, normalized(cross(b - a, c - a))});
+    out.push_back({a + (b - a) * u + (c - a) * v, normalized(cross(b - a, c - a)), sum / static_cast<double>(kPlaces)});
   }
   return out;
 }
@@ -94,11 +132,15 @@ Vec3 rotation_vector(const Mat3& m) {
   return sin < 1e-15 ? Vec3{} : twice * (portable::atan2(sin, cos) / (2 * sin));
 }
 
-double median_of(std::vector<double> v) {
+double quantile_of(std::vector<double> v, double share) {
   if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
+  const auto at = v.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(v.size()) * share);
+  std::nth_element(v.begin(), at, v.end());
+  return *at;
+}
+
+double median_of(std::vector<double> v) {
+  return quantile_of(std::move(v), 0.5);
 }
 
 std::array<int, 3> patch_of(Vec3 p, double size) {
@@ -182,6 +224,14 @@ void deviation(FragmentOutcome& out, const PlannedFragment& planned, const Fit& 
     out.shift_mm[k] = {shift[k], half_along(shifts, quantile, axis - out.slides_along * out.slides_along[k])};
     out.turn_deg[k] = {turn[k] / kDeg, quantile * std::sqrt(own[k + 3][k + 3] + other[k + 3][k + 3]) / kDeg};
   }
+}
+
+void judge(FragmentOutcome& out, const OutcomeParams& params) {
+  out.known = true;
+  for (std::size_t k = 0; k < 3; ++k)
+    out.known =
+        out.known && out.shift_mm[k].half <= params.max_unsure_mm && out.turn_deg[k].half <= params.max_unsure_deg;
+  if (!out.known) out.why = "the interval is wider than what is accepted";
 }
 
 }  // namespace osteo::inline session::outcome

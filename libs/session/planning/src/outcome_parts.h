@@ -1,8 +1,11 @@
 // What the sources of outcomes share: places on a surface, a pose that was found, and its deviation from the plan.
 #pragma once
 #include <array>
+#include <cstdint>
 #include <numbers>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "edge_fit.h"
@@ -20,6 +23,7 @@ constexpr double kMinFound = 0.35;  ///< of a fragment's places, without which i
 
 struct SurfacePlace {
   Vec3 at, normal;
+  double mm2 = 0;  ///< of the surface that it stands for
 };
 
 struct Fit {
@@ -32,9 +36,20 @@ struct Fit {
 
 [[nodiscard]] RigidTransform small_motion(Vec3 about, Vec3 shift, Vec3 turn);
 [[nodiscard]] Vec3 rotation_vector(const Mat3& m);
+/// `share` below 1; 0 of nothing.
+[[nodiscard]] double quantile_of(std::vector<double> v, double share);
 [[nodiscard]] double median_of(std::vector<double> v);
 [[nodiscard]] std::array<int, 3> patch_of(Vec3 p, double size);
-/// 2000 places over what lies behind the planes, in one piece with what is nearest to the first one's place.
+/// Error(usage): its surface is not given.
+[[nodiscard]] const TriangleSoup& bone_called(const std::vector<std::pair<std::string, TriangleSoup>>& bones,
+                                              const std::string& name);
+/// The plan leaves it where it is.
+[[nodiscard]] bool stays(const PlannedFragment& f);
+/// Of each triangle that is `in` the number of its piece, by shared points, in order of their first triangles; of
+/// others 0.
+[[nodiscard]] std::vector<std::uint32_t> pieces_of(const TriangleSoup& s, const std::vector<bool>& in);
+/// 2000 places over what lies behind the planes, in one piece with what is nearest to the first one's place; without
+/// planes over the largest piece.
 [[nodiscard]] std::vector<SurfacePlace> spread(const TriangleSoup& bone, const std::vector<const CutPlane*>& planes);
 /// The shift and turn of a place under a pose's error, from its unknowns, in other axes.
 [[nodiscard]] std::array<planning::Row<7>, 6> at_place(const Fit& fit, Vec3 place, const Mat3& axes);
@@ -45,6 +60,14 @@ struct Fit {
 /// Shift and turn, at out.middle_mm, of what was found against where the plan has it in the reference's axes.
 void deviation(FragmentOutcome& out, const PlannedFragment& planned, const Fit& fit, const Fit& reference,
                const OutcomeParams& params);
+/// Known where its intervals are as narrow as is asked for; else why not.
+void judge(FragmentOutcome& out, const OutcomeParams& params);
+
+/// Outlines and condyles; the bone of the plan's first plane is the jaw.
+void find_contours(Outcome& out, const SurgicalPlan& plan,
+                   const std::vector<std::pair<std::string, TriangleSoup>>& bones,
+                   const std::vector<std::optional<Fit>>& fits, const std::vector<std::vector<SurfacePlace>>& places,
+                   std::size_t reference, const OutcomeParams& params, const Context& context);
 
 // -- Metal and holes; `fits` as the plan's fragments.
 

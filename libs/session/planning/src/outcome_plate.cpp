@@ -13,6 +13,7 @@
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/portable_math.h"
 #include "osteo/geometry/distance/distance_map.h"
+#include "outcome_metal.h"
 #include "outcome_parts.h"
 #include "section.h"
 
@@ -24,15 +25,13 @@ using planning::EdgeReader;
 using planning::Equation;
 using planning::Row;
 
-constexpr double kSearchMm = 3, kSearchDeg = 4, kMarginMm = 3.5, kOnFragmentMm = 5, kNearMetalMm = 4;
-constexpr double kUnitHu = 100, kKeptHu = 150, kRingBlurs = 2.5, kRingMm = 0.3, kBrightShare = 0.8;
+constexpr double kSearchMm = 3, kSearchDeg = 4, kMarginMm = 3.5, kOnFragmentMm = 5;
 constexpr double kFinestMm = 0.2, kPatchMm = 3, kMinSeen = 0.3, kMinFits = 0.6;
 constexpr double kSharper = 0.8, kWider = 1.25;  // the blurs between which that of metal is looked for
-constexpr double kBlurDoubtMm = 0.05;
 // What scatter does not show; with 0.02 mm and 0.1 degrees intervals were twice as wide as errors ask for.
 constexpr double kModelMm = 0.012, kModelDeg = 0.05;
 constexpr std::size_t kMostCells = 8000000, kStarts = 3;
-constexpr int kRounds = 25, kCoarseRounds = 4;
+constexpr int kCoarseRounds = 4;
 
 // A plate on a grid of its own: signed distance, and what is left of it under two blurs.
 class PlateField {
@@ -215,44 +214,22 @@ class Finder {
   std::vector<Site> sites(const PlateField& field, const RigidTransform& pose, const TriangleSoup& surface, double blur,
                           double& seen) const {
     const double reach = 2 * blur + 0.2, beside = kRingBlurs * blur + kRingMm, bright = kBrightShare * metal_;
-    const Frame& f = postop_.frame;
     const BoxMm own = bounds_of(surface);
-    std::array<int, 3> from{}, to{};
-    for (std::size_t a = 0; a < 3; ++a) {
-      from[a] = f.dims[a] - 1;
-      to[a] = 0;
-    }
-    for (int c = 0; c < 8; ++c) {
-      const Vec3 i = f.index_from_world(
-          pose({(c & 1) != 0 ? own.hi.x + reach : own.lo.x - reach, (c & 2) != 0 ? own.hi.y + reach : own.lo.y - reach,
-                (c & 4) != 0 ? own.hi.z + reach : own.lo.z - reach}));
-      for (std::size_t a = 0; a < 3; ++a) {
-        from[a] = std::clamp(static_cast<int>(std::floor(i[a])), 0, from[a]);
-        to[a] = std::clamp(static_cast<int>(std::ceil(i[a])), to[a], f.dims[a] - 1);
-      }
-    }
+    const Vec3 more{reach, reach, reach};
     const RigidTransform back = pose.inverse();
     std::vector<Site> out;
     double all = 0;
-    for (int k = from[2]; k <= to[2]; ++k) {
-      for (int j = from[1]; j <= to[1]; ++j) {
-        for (int i = from[0]; i <= to[0]; ++i) {
-          const Vec3 x = f.world_from_index(Vec3(i, j, k)), q = back(x);
-          const double mm = field.mm(q);
-          if (mm > reach) continue;
-          all += 1;
-          const Vec3 outer = q + field.outwards(q) * (beside - mm);
-          if (field.mm(outer) < 0.8 * beside) continue;
-          const auto there = ct_.value(pose(outer));
-          if (!there || *there > bright) continue;
-          const std::size_t n =
-              (static_cast<std::size_t>(k) * static_cast<std::size_t>(f.dims[1]) + static_cast<std::size_t>(j)) *
-                  static_cast<std::size_t>(f.dims[0]) +
-              static_cast<std::size_t>(i);
-          out.push_back({x, q, static_cast<double>(postop_.voxels[n]), *there});
-        }
-      }
-    }
+    each_voxel_about(postop_.frame, own.lo - more, own.hi + more, pose, [&](Vec3 x, std::size_t voxel) {
+      const Vec3 q = back(x);
+      const double mm = field.mm(q);
+      if (mm > reach) return;
+      all += 1;
+      const Vec3 outer = q + field.outwards(q) * (beside - mm);
+      if (field.mm(outer) < 0.8 * beside) return;
+      const auto there = ct_.value(pose(outer));
+      if (!there || *there > bright) return;
+      out.push_back({x, q, static_cast<double>(postop_.voxels[voxel]), *there});
+    });
     seen = all > 0 ? static_cast<double>(out.size()) / all : 0;
     return out;
   }
@@ -264,7 +241,7 @@ class Finder {
     fit.pose = start;
     const double as_bone = (1 - kSharper) / (kWider - kSharper);
     double hu = 1.5 * metal_, mix = as_bone;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kMetalRounds; ++round) {
       context_.check_cancelled();
       const auto all = sites(field, fit.pose, surface, blur, fit.found);
       if (fit.found < kMinSeen || all.size() < 100) {
@@ -338,11 +315,52 @@ class Finder {
   const Context& context_;
 };
 
+constexpr double kShortestPlateMm = 8;
+
+// Plates of one file are rigid each by itself. What faces inwards and lies within another's box is a hollow of that
+// one, not a plate.
+std::vector<PlannedPlate> plates_in(const PlannedPlate& file) {
+  const TriangleSoup& s = file.surface;
+  const auto piece = pieces_of(s, std::vector<bool>(s.triangles.size(), true));
+  struct Piece {
+    BoxMm box;
+    double volume = 0;
+    std::size_t of = 0;
+  };
+  std::vector<Piece> all;
+  for (std::size_t n = 0; n < piece.size(); ++n) {
+    if (piece[n] >= all.size()) all.push_back({{}, 0, all.size()});
+    const auto& t = s.triangles[n];
+    for (const std::uint32_t p : t) all[piece[n]].box.include(s.points_mm[p]);
+    all[piece[n]].volume += dot(s.points_mm[t[0]], cross(s.points_mm[t[1]], s.points_mm[t[2]]));
+  }
+  const auto holds = [](const BoxMm& a, const BoxMm& b) {
+    bool in = true;
+    for (std::size_t k = 0; k < 3; ++k) in = in && a.lo[k] < b.lo[k] && a.hi[k] > b.hi[k];
+    return in;
+  };
+  for (Piece& p : all)
+    for (std::size_t n = 0; n < all.size() && p.volume < 0; ++n)
+      if (all[n].volume > 0 && holds(all[n].box, p.box)) p.of = n;
+  std::vector<PlannedPlate> out;
+  std::vector<std::size_t> place(all.size(), all.size());
+  for (std::size_t n = 0; n < piece.size(); ++n) {
+    std::size_t& at = place[all[piece[n]].of];
+    if (at == all.size()) {
+      at = out.size();
+      out.push_back({file.name + " " + std::to_string(out.size() + 1), {s.points_mm, {}}});
+    }
+    out[at].surface.triangles.push_back(s.triangles[n]);
+  }
+  if (out.size() == 1) out.front().name = file.name;
+  for (PlannedPlate& p : out) p.surface = compacted(p.surface);
+  return out;
+}
+
 }  // namespace
 }  // namespace plates
 
 void require_plates(const SurgicalPlan& plan) {
-  constexpr double kShortestPlateMm = 8;
   for (const PlannedPlate& plate : plan.plates) {
     require_sound(plate.surface);
     if (plate.surface.triangles.empty())
@@ -350,7 +368,7 @@ void require_plates(const SurgicalPlan& plan) {
     if (!is_closed(plate.surface))
       throw Error(ExitCode::usage, "the surface of '" + plate.name + "' is not closed",
                   "'osteo mesh-repair' closes surfaces");
-    planning::require_size_mm(bounds_of(plate.surface), plate.name, kShortestPlateMm);
+    planning::require_size_mm(bounds_of(plate.surface), plate.name, plates::kShortestPlateMm);
   }
 }
 
@@ -362,10 +380,18 @@ void find_plates(Outcome& out, const SurgicalPlan& plan, const std::vector<std::
   const Finder finder(ct, postop, params, context);
   std::size_t reference = 0;
   while (!out.fragments[reference].reference) ++reference;
-  for (const PlannedPlate& plate : plan.plates) {
+  std::vector<PlannedPlate> all;
+  for (const PlannedPlate& file : plan.plates)
+    for (PlannedPlate& plate : plates_in(file)) all.push_back(std::move(plate));
+  for (const PlannedPlate& plate : all) {
     std::string why;
     const Fit& base = *fits[reference];
-    const auto fit = finder.find(plate, base.pose, blur_of(base), why);
+    const BoxMm box = bounds_of(plate.surface);
+    std::optional<Fit> fit;
+    if (length(box.hi - box.lo) < kShortestPlateMm)
+      why = "this piece of the surface is too small for a plate";
+    else
+      fit = finder.find(plate, base.pose, blur_of(base), why);
     const auto on = spread(plate.surface, {});
     Vec3 middle;
     for (const SurfacePlace& p : on) middle += p.at / static_cast<double>(on.size());
@@ -396,11 +422,7 @@ void find_plates(Outcome& out, const SurgicalPlan& plan, const std::vector<std::
       Fit of = *fits[n];
       of.pose = of.pose * plan.fragments[n].planned_from_ct.inverse();
       deviation(o.pose, {}, *fit, of, params);
-      o.pose.known = true;
-      for (std::size_t k = 0; k < 3; ++k)
-        o.pose.known = o.pose.known && o.pose.shift_mm[k].half <= params.max_unsure_mm &&
-                       o.pose.turn_deg[k].half <= params.max_unsure_deg;
-      if (!o.pose.known) o.pose.why = "the interval is wider than what is accepted";
+      judge(o.pose, params);
     }
   }
 }

@@ -7,6 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/param.h"
 #include "osteo/core/data/json_vec.h"
 
 namespace osteo::inline session {
@@ -136,6 +137,14 @@ class PlanReader {
 };
 
 }  // namespace
+
+namespace planning {
+std::string rounded(double value, int decimals) {
+  double scale = 1;
+  for (int n = 0; n < decimals; ++n) scale *= 10;
+  return format_number(std::round(scale * value) / scale);
+}
+}  // namespace planning
 
 const CutPlane& SurgicalPlan::plane(std::string_view name) const {
   std::string names;

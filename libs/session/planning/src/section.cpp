@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "osteo/core/base/error.h"
-#include "osteo/core/base/param.h"
+#include "osteo/session/planning/detail/plan.h"
 
 namespace osteo::inline session::planning {
 namespace {
@@ -37,10 +37,7 @@ void require_size_mm(const BoxMm& box, const std::string& name, double shortest_
   const Unit unit = longest > kLongestMm           ? Unit{"micrometres", "0.001"}
                     : longest < kLongestInMetresMm ? Unit{"metres", "1000"}
                                                    : Unit{"centimetres or inches", "10 or 25.4"};
-  const auto mm = [](double x) {
-    const double parts = x < 1 ? 1e4 : 10;
-    return format_number(std::round(x * parts) / parts);
-  };
+  const auto mm = [](double x) { return rounded(x, x < 1 ? 4 : 1); };
   throw Error(ExitCode::usage,
               "the " + name + " is " + mm(size.x) + " x " + mm(size.y) + " x " + mm(size.z) +
                   " mm large: its lengths look like " + std::string(unit.name),

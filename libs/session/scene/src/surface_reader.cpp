@@ -1,11 +1,37 @@
 #include "osteo/session/scene/detail/surface_reader.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "body_names.h"
 #include "osteo/core/base/files.h"
 
 namespace osteo::inline session {
+namespace {
+
+// Marks what of a brick is not as it was. A cut is thinner than a brick: most of what is around it stays.
+void mark_difference(LiveSurface& surface, const BrickGrid& before, std::uint32_t brick) {
+  const BrickGrid& now = surface.bone();
+  const VoxelKey first = brick * BrickGrid::kVoxels;
+  int lo[3] = {8, 8, 8}, hi[3] = {-1, -1, -1};
+  for (int v = 0; v < BrickGrid::kVoxels; ++v) {
+    const VoxelKey key = first + static_cast<VoxelKey>(v);
+    if (now.value(key) == before.value(key)) continue;
+    const int at[3] = {v & 7, v >> 3 & 7, v >> 6};
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], at[a]);
+      hi[a] = std::max(hi[a], at[a]);
+    }
+  }
+  if (hi[0] < 0) return;
+  // What the corners of a box within one brick reach is what all of it reaches.
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const auto side = [&](std::size_t a) { return (corner >> a & 1) != 0 ? hi[a] : lo[a]; };
+    surface.mark(first + BrickGrid::offset_in_brick(side(0), side(1), side(2)));
+  }
+}
+
+}  // namespace
 
 SurfaceReader::SurfaceReader(const World& world, const Context& context) : threads_(context.threads) {
   for (const PlacedBody& placed : world.bodies()) {
@@ -97,10 +123,10 @@ void SurfaceReader::scene_changed(const World& world, const World::Effect& effec
   }
   for (const auto& changed : effect.changed) {
     Followed& f = bodies_.at(changed.body);
-    f.body = world.find(changed.body)->body;
+    const std::shared_ptr<const Body> before = std::exchange(f.body, world.find(changed.body)->body);
     f.surface->rebind(f.body->bone);
     for (const std::uint32_t b : changed.bricks) {
-      if (!known.has(changed.body, b)) f.surface->mark_brick(b);
+      if (!known.has(changed.body, b)) mark_difference(*f.surface, before->bone, b);
     }
     update(f);
   }

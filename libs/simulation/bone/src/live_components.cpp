@@ -157,16 +157,21 @@ std::span<const LiveComponents::Component> LiveComponents::update() {
     is_dirty_[b] = 0;
     label(b);
   }
+  // Who links to a brick: those that have it further on. By faces these are three, by edges and corners all around.
+  std::vector<Ijk> back;
+  for (const Ijk s : steps_) {
+    for (int axes = 1; axes < 8; ++axes) {
+      const Ijk d{(axes & 1) != 0 ? -s.i : 0, (axes & 2) != 0 ? -s.j : 0, (axes & 4) != 0 ? -s.k : 0};
+      if (d != Ijk{} && std::find(back.begin(), back.end(), d) == back.end()) back.push_back(d);
+    }
+  }
   for (const std::uint32_t b : dirty_) {
     relink(b);
     const Ijk o = bone_->brick_coordinate(b);
-    // Who links to it: bricks that have it further on, through a face, an edge or a corner.
-    for (int k = -1; k <= 1; ++k)
-      for (int j = -1; j <= 1; ++j)
-        for (int i = -1; i <= 1; ++i) {
-          const std::uint32_t n = bone_->find_brick(o.i + i, o.j + j, o.k + k);
-          if (n != BrickGrid::kNone && n != b) relink(n);
-        }
+    for (const Ijk d : back) {
+      const std::uint32_t n = bone_->find_brick(o.i + d.i, o.j + d.j, o.k + d.k);
+      if (n != BrickGrid::kNone) relink(n);
+    }
   }
   for (const std::uint32_t b : again) {
     relink_[b] = 0;

@@ -17,9 +17,13 @@ std::uint32_t nearest_owner(const BrickGrid& bone, const LiveComponents& compone
   std::array<std::uint32_t, 26> near;
   std::size_t n = 0;
   const Ijk c = bone.coordinate(key);
+  const auto within = [](int x) { return ((x & 7) - 1U) < 6U; };
+  const bool inner = within(c.i) && within(c.j) && within(c.k);  // its neighbours are in the same brick
   for (int d = 0; d < 27; ++d) {
     if (d == 13) continue;
-    const VoxelKey other = bone.find(c.i + d % 3 - 1, c.j + d / 3 % 3 - 1, c.k + d / 9 - 1);
+    const int i = d % 3 - 1, j = d / 3 % 3 - 1, k = d / 9 - 1;
+    const VoxelKey other =
+        inner ? key + static_cast<VoxelKey>(i + 8 * j + 64 * k) : bone.find(c.i + i, c.j + j, c.k + k);
     if (other == BrickGrid::kNone) continue;
     if (const std::uint32_t o = components.component_of(other); o != LiveComponents::kNone) near[n++] = o;
   }

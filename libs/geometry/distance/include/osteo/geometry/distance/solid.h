@@ -17,10 +17,10 @@ struct SolidSurface {
 /// Inside is where the winding number's magnitude exceeds one half (for closed surfaces: is not zero), as for
 /// voxels_inside: overlaps count once, a body within a body changes nothing, a shell within a body that faces inward is
 /// a cavity, an inside-out body is as if it were not. Triangles are judged by patches (joined over edges of two), each
-/// by the solid angles of all others at its largest triangle, so that sheets of any thinness are distinguished; of
+/// at its largest triangle by rays, in doubt by all solid angles, so that sheets of any thinness are distinguished; of
 /// triangles with the same corners one is left at most. The surface's triangles may touch and share edges but must not
-/// cross: a patch is judged by one place of it, so find crossings first (self_intersections). O(patches * triangles).
-/// Errors: failed when nothing is left (a sheet, or twice the same surface the other way round).
+/// cross: a patch is judged by one place of it, so find crossings first (self_intersections). O(n log n), in doubt O(n)
+/// more a patch. Errors: failed when nothing is left (a sheet, or twice the same surface the other way round).
 [[nodiscard]] SolidSurface solid_surface(const TriangleSoup& soup, const Context& context = {});
 
 /// Volume inside by that rule, mm3. Where the surface closes by the divergence theorem (about a point of the surface),

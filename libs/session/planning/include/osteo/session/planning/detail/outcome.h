@@ -52,6 +52,25 @@ struct CutOutcome {
   double seen = 0;                     ///< share of the face at which the CT shows it
 };
 
+/// How far the outline of what the plan moves lies from a target, with the reference where it was. Of the plan: the
+/// surface of all fragments that it moves, along the shortest way to where the plan has that bone's surface. Of the
+/// mirrored side, where segments of another bone lie between two planes: from places on its lower border, 2 mm apart,
+/// across the axis of the segment that is planned there.
+struct ContourOutcome {
+  std::string against;  ///< "plan", "mirrored side"
+  bool known = false;
+  std::string why;
+  Interval95 mean_mm, p95_mm;                      ///< of all places the mean, and what 95 % of them keep
+  double planned_mean_mm = 0, planned_p95_mm = 0;  ///< what the plan has
+};
+
+/// A condyle of the jaw, where the surface before surgery shows one: the middle of the surface within 8 mm of the
+/// hindmost and highest place of its side.
+struct CondyleOutcome {
+  std::string side;      ///< "left", "right": the patient's
+  FragmentOutcome pose;  ///< of the fragment that it is a part of, by that one's name; `middle_mm`: the condyle's
+};
+
 /// A screw or an empty hole against the plan, relative to the fragment that it is in, in the CT of that one's bone.
 struct ScrewOutcome {
   std::string name, fragment;
@@ -60,6 +79,7 @@ struct ScrewOutcome {
   bool known = false;  ///< where it enters
   bool direction_known = false, tip_known = false;
   std::string why;                     ///< of the first of these that is not known
+  std::string finding;                 ///< that it may be another one; empty: it lies near its place
   std::array<Interval95, 3> entry_mm;  ///< where its axis passes the planned entry, across the planned axis
   std::array<Interval95, 3> tip_mm;    ///< of the axis' end
   std::array<Interval95, 2> tilt_deg;  ///< of its axis, towards two directions across the planned one
@@ -70,6 +90,7 @@ struct ScrewOutcome {
 };
 
 /// A plate against a fragment: against the reference as the plan has it, against another where that one came to lie.
+/// Each piece of a plate's surface is a plate: "NAME 1", "NAME 2".
 struct PlateOutcome {
   std::string against;
   FragmentOutcome pose;  ///< its name is the plate's; `edge_mm` is not set
@@ -78,6 +99,8 @@ struct PlateOutcome {
 struct Outcome {
   std::vector<FragmentOutcome> fragments;  ///< as in the plan
   std::vector<CutOutcome> cuts;            ///< of each fragment each plane
+  std::vector<ContourOutcome> contours;    ///< against the plan, against the mirrored side
+  std::vector<CondyleOutcome> condyles;    ///< left, right
   std::vector<ScrewOutcome> screws;        ///< as in the plan
   std::vector<PlateOutcome> plates;        ///< of each plate the reference, and each fragment within 5 mm of it
 };
@@ -95,6 +118,8 @@ struct Outcome {
 /// no edge, and then is not known. Intervals: errors of edges within 8 mm are alike, so each such patch is left out in
 /// turn (J. MacKinnon, H. White, Journal of Econometrics 1985), with Student's quantile; of a cut face, patches of at
 /// most 8 mm, as large as leaves eight of them. The pose's part is in that of the cuts.
+///
+/// Outlines: how far a place is off changes with each pose; intervals are of 1000 draws of the poses' errors.
 ///
 /// A screw is looked for within 2.5 mm and 15 degrees of where the plan has it in its fragment, a plate within 3 mm and
 /// 4 degrees of where the reference has it. Its blurred shape, over what lies beside it, is held against the voxels by

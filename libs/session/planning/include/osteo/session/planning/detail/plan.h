@@ -11,6 +11,11 @@
 
 namespace osteo::inline session {
 
+namespace planning {
+/// With so many decimals at most, for what people read.
+[[nodiscard]] std::string rounded(double value, int decimals);
+}  // namespace planning
+
 /// A plane in which a bone is sawn, in LPS mm of that bone's CT. Names of bones are the plan's own ("mandible").
 struct CutPlane {
   std::string name, bone;

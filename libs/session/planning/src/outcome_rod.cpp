@@ -1,19 +1,16 @@
-// Screws and empty holes of a plan, in a CT after surgery.
+#include "outcome_rod.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <numbers>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "osteo/core/base/portable_math.h"
-#include "outcome_parts.h"
+#include "outcome_metal.h"
 
-namespace osteo::inline session::outcome {
-namespace rods {
+namespace osteo::inline session::outcome::rods {
 namespace {
 
 using planning::EdgeReader;
@@ -21,25 +18,16 @@ using planning::Equation;
 using planning::Row;
 
 constexpr double kSearchMm = 2.5, kSearchStepMm = 0.5, kSearchDeg = 15, kFarthestMm = 3, kFarthestDeg = 18;
-constexpr double kNearMetalMm = 4, kUnitHu = 100, kSoftHu = 40;
+constexpr double kSoftHu = 40;
 constexpr double kHeadBlurs = 3.6;  // below its head or plate, which tilt it, a shaft is looked at from there on
-constexpr double kRingBlurs = 2.5;  // beyond its surface, the blur of a shaft has ended
-constexpr double kRingMm = 0.3;
-constexpr double kBrightShare = 0.8;  // of the HU of metal: what is brighter beside a shaft is no bone
 constexpr double kMinSeen = 0.4, kMinShaft = 0.6, kHoleContrast = 0.45, kHoleBoneHu = 350, kHoleDepthMm = 1.5;
-constexpr double kSameRod = 0.5;      // of a diameter between two axes: one screw was found twice
-constexpr double kUndecidedMm = 0.5;  // which of two planned screws one is
 constexpr double kPatchMm = 2, kMinVoxelsAcross = 1.5;
-constexpr double kKeptHu = 150;        // off by less than this, a voxel is never left out
-constexpr double kBlurDoubtMm = 0.05;  // how well the blur of bone's edges is that of metal's
 // What the voxels' own scatter does not show: the kernel is not quite a Gaussian, the bone beside it not quite even.
-// With 0.015 mm and 0.15 degrees, intervals of entries held 87 %, those of tilts 90 %; with the latter, of holes 79 %.
-// Streaks of a plate and of its other screws tilt a shaft further: beside one, tilts held 80 % with a factor of 1.
-constexpr double kModelMm = 0.02, kModelEndMm = 0.03, kModelDeg = 0.19, kHoleModelDeg = 0.7, kBesidePlate = 2.2;
-// A hole that ends in marrow or goes through shows no bottom; what there was taken for one was up to 1.6 mm off.
-constexpr double kBottomHu = 400, kBottomDoubt = 2;
-constexpr int kRounds = 25, kCoarseRounds = 3, kRing = 8;
-constexpr const char* kOneForTwo = "one lies where two are planned; which of them it is cannot be known";
+// With 0.15 degrees intervals of tilts held 90 %; of holes 79 %. Streaks of a plate and of its other screws tilt a
+// shaft further: beside one, tilts held 80 % with a factor of 1.
+constexpr double kModelDeg = 0.19, kHoleModelDeg = 0.7, kBesidePlate = 2.2;
+constexpr double kBottomHu = 400;  // about the bottom of a hole; a hole that ends in marrow or goes through shows none
+constexpr int kCoarseRounds = 3, kRing = 8;
 const double kInf = std::numeric_limits<double>::infinity();
 
 // What blur leaves of a long cylinder, over the distance from its axis.
@@ -71,47 +59,11 @@ class BlurredDisc {
   std::vector<double> at_;
 };
 
-struct Rod {
-  Vec3 at;                             ///< on its axis, beside the planned entry; in the CT after surgery
-  Mat3 axes;                           ///< the third runs from the entry to the tip
-  double tip = 0, hu = 0, blur = 0.5;  ///< where it ends along the third
-  [[nodiscard]] Vec3 local(Vec3 p) const { return transposed(axes) * (p - at); }
-  [[nodiscard]] Vec3 world(Vec3 q) const { return at + axes * q; }
-  // Shifted and tilted at `middle` along its axis.
-  [[nodiscard]] Rod moved(double middle, double u, double v, double a, double b) const {
-    Rod r = *this;
-    const Vec3 pivot = world({u, v, middle}), w = normalized(axes * Vec3{a, b, 1});
-    const Vec3 x = normalized(axes.column[0] - w * dot(axes.column[0], w));
-    r.axes = {{x, cross(w, x), w}};
-    r.at = pivot - w * middle;
-    return r;
-  }
-};
-
-struct RodFit {
-  Rod rod;
-  double middle = 0;                                     ///< along the axis; shifts and tilts are about it
-  planning::Square<5> covariance{};                      ///< shift and tilt along the first two axes, tip
-  double quantile = 0, seen = 0, shaft_mm = 0, off = 0;  ///< off: of the planned axis at the middle
-  bool end_seen = true;
-  bool plated = false;  ///< other metal goes out from its head
-  [[nodiscard]] double model_tilt(bool empty) const {
-    return (empty ? kHoleModelDeg : plated ? kBesidePlate * kModelDeg : kModelDeg) * kDeg;
-  }
-};
-
-struct Wanted {
-  const PlannedScrew* screw = nullptr;
-  double length = 0, radius = 0;
-  Rod planned;  ///< where its fragment has come to lie
-};
-
-class Finder {
+class Search {
  public:
-  Finder(const EdgeReader& ct, const Image& postop, const OutcomeParams& params)
-      : ct_(ct), postop_(postop), metal_(params.metal_hu), clip_(clip_of(postop)) {}
+  Search(const EdgeReader& ct, const Image& postop, double metal, double clip)
+      : ct_(ct), postop_(postop), metal_(metal), clip_(clip) {}
 
-  // Nothing: `why`, and whether it is sure that it is not there.
   std::optional<RodFit> find(const Wanted& w, const std::vector<Rod>& taken, double taken_radius, std::string& why,
                              bool& there) const {
     there = true;
@@ -312,44 +264,23 @@ class Finder {
   std::vector<Site> sites(const Wanted& w, const Rod& r, double top, double& seen) const {
     const double reach = w.radius + 2 * r.blur + 0.2, beside = w.radius + kRingBlurs * r.blur + kRingMm;
     const double bottom = r.tip + 3 * r.blur + 0.3, bright = kBrightShare * metal_;
-    const Frame& f = postop_.frame;
-    std::array<double, 3> lo{1e9, 1e9, 1e9}, hi{-1e9, -1e9, -1e9};
-    for (int c = 0; c < 8; ++c) {
-      const Vec3 i = f.index_from_world(
-          r.world({(c & 1) != 0 ? reach : -reach, (c & 2) != 0 ? reach : -reach, (c & 4) != 0 ? bottom : top}));
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], i[a]);
-        hi[a] = std::max(hi[a], i[a]);
-      }
-    }
-    std::array<int, 3> from{}, to{};
-    for (std::size_t a = 0; a < 3; ++a) {
-      from[a] = std::clamp(static_cast<int>(std::floor(lo[a])), 0, f.dims[a] - 1);
-      to[a] = std::clamp(static_cast<int>(std::ceil(hi[a])), 0, f.dims[a] - 1);
-    }
     std::vector<Site> out;
     double all = 0;
-    for (int k = from[2]; k <= to[2]; ++k) {
-      for (int j = from[1]; j <= to[1]; ++j) {
-        for (int i = from[0]; i <= to[0]; ++i) {
-          const Vec3 x = f.world_from_index(Vec3(i, j, k)), q = r.local(x);
+    each_voxel_about(
+        postop_.frame, {-reach, -reach, top}, {reach, reach, bottom}, [&](Vec3 q) { return r.world(q); },
+        [&](Vec3 x, std::size_t voxel) {
+          const Vec3 q = r.local(x);
           const double mm = portable::hypot(q.x, q.y);
-          if (mm > reach || q.z < top || q.z > bottom) continue;
+          if (mm > reach || q.z < top || q.z > bottom) return;
           all += 1;
           const auto around = ring(r, beside, q.z);
           double mean = 0;
           for (const double v : around) mean += std::min(v, bright) / kRing;
           const Vec3 out_to = mm > 1e-6 ? Vec3{q.x / mm * beside, q.y / mm * beside, q.z} : Vec3{beside, 0, q.z};
           const double there = value(r.world(out_to)), t = std::min(1.0, mm / w.radius);
-          if (t > 0.5 ? there > bright : mean > 0.6 * bright + 0.4 * kSoftHu) continue;
-          const std::size_t n =
-              (static_cast<std::size_t>(k) * static_cast<std::size_t>(f.dims[1]) + static_cast<std::size_t>(j)) *
-                  static_cast<std::size_t>(f.dims[0]) +
-              static_cast<std::size_t>(i);
-          out.push_back({x, static_cast<double>(postop_.voxels[n]), t * std::min(there, bright) + (1 - t) * mean});
-        }
-      }
-    }
+          if (t > 0.5 ? there > bright : mean > 0.6 * bright + 0.4 * kSoftHu) return;
+          out.push_back({x, static_cast<double>(postop_.voxels[voxel]), t * std::min(there, bright) + (1 - t) * mean});
+        });
     seen = all > 0 ? static_cast<double>(out.size()) / all : 0;
     return out;
   }
@@ -361,7 +292,7 @@ class Finder {
     const bool metal = N == 7;
     const double planned_blur = r.blur;
     const double clip = metal ? clip_ : kInf;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kMetalRounds; ++round) {
       double top = -0.5;
       if (metal) {
         double run = 1.2;  // how far metal goes on from the tip to the head
@@ -463,170 +394,18 @@ class Finder {
   double metal_, clip_;
 };
 
-// From the fit to the plan's axes, in the CT of the fragment's bone.
-void compare(ScrewOutcome& out, const Wanted& w, const RodFit& rod, const Fit& fragment, const OutcomeParams& params) {
-  const RigidTransform back = fragment.pose.inverse();
-  const PlannedScrew& s = *w.screw;
-  const Vec3 wanted = normalized(s.tip_mm - s.entry_mm);
-  const Mat3 to_bone = {{back.rotation * rod.rod.axes.column[0], back.rotation * rod.rod.axes.column[1],
-                         back.rotation * rod.rod.axes.column[2]}};
-  const Vec3 axis = to_bone.column[2], through = back(rod.rod.at);
-  const double along = dot(s.entry_mm - through, wanted) / dot(axis, wanted);
-  const Vec3 entry = through + axis * along, tip = back(rod.rod.world({0, 0, rod.rod.tip}));
-  out.axes = {back.rotation * w.planned.axes.column[0], back.rotation * w.planned.axes.column[1]};
-  out.seen = rod.seen;
-  const double quantile = std::max(rod.quantile, fragment.quantile);
-
-  // The covariance of a place on the axis: the fit's, the pose's, the model's.
-  using Three = std::array<std::array<double, 3>, 3>;
-  const auto spread_at = [&](double s_mm, bool end) {
-    std::array<Row<5>, 3> slope{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      slope[k][0] = to_bone.column[0][k];
-      slope[k][1] = to_bone.column[1][k];
-      slope[k][2] = to_bone.column[0][k] * (s_mm - rod.middle);
-      slope[k][3] = to_bone.column[1][k] * (s_mm - rod.middle);
-      if (end) slope[k][4] = axis[k] * (s.empty ? kBottomDoubt : 1);
-    }
-    Three sum = planning::carried<5, 3>(slope, rod.covariance);
-    const auto moves = at_place(fragment, rod.rod.world({0, 0, s_mm}), back.rotation);
-    const Three pose = planning::carried<7, 3>({moves[0], moves[1], moves[2]}, fragment.covariance);
-    const double tilt = rod.model_tilt(s.empty) * (s_mm - rod.middle), end_mm = end ? kModelEndMm : 0;
-    for (std::size_t r = 0; r < 3; ++r) {
-      for (std::size_t c = 0; c < 3; ++c) sum[r][c] += pose[r][c] + (end_mm * end_mm - tilt * tilt) * axis[r] * axis[c];
-      sum[r][r] += kModelMm * kModelMm + tilt * tilt;
-    }
-    return sum;
-  };
-  const Three at_entry = spread_at(along, false), at_tip = spread_at(rod.rod.tip, true);
-  const auto moves = at_place(fragment, fragment.pose(s.entry_mm), back.rotation);
-  out.slides_along = slide_of(planning::carried<7, 3>({moves[0], moves[1], moves[2]}, fragment.covariance), quantile,
-                              params.max_unsure_mm);
-  const auto fill = [&](std::array<Interval95, 3>& to, Vec3 off, const Three& covariance, bool across) {
-    bool sure = true;
-    // Across the screw, and what is left of the way along which nothing is known: at right angles, so that the order in
-    // which both are taken off makes no difference.
-    Vec3 unknown = out.slides_along;
-    if (across) unknown -= wanted * dot(unknown, wanted);
-    unknown = length(unknown) > 1e-6 ? normalized(unknown) : Vec3{};
-    const auto left = [&](Vec3 v) {
-      if (across) v -= wanted * dot(v, wanted);
-      return v - unknown * dot(v, unknown);
-    };
-    off = left(off);
-    for (std::size_t k = 0; k < 3; ++k) {
-      Vec3 a;
-      a[k] = 1;
-      to[k] = {off[k], half_along(covariance, quantile, left(a))};
-      sure = sure && to[k].half <= params.max_unsure_mm;
-    }
-    return sure;
-  };
-  out.known = fill(out.entry_mm, entry - s.entry_mm, at_entry, true);
-  out.tip_known = fill(out.tip_mm, tip - s.tip_mm, at_tip, false) && rod.end_seen;
-  // The tilt: the fit's, and the pose's turn.
-  out.direction_known = true;
-  Row<2> tangent{};
-  for (std::size_t k = 0; k < 2; ++k) {
-    tangent[k] = dot(axis, out.axes[k]) / dot(axis, wanted);
-    Row<5> own{};
-    own[2] = dot(to_bone.column[0], out.axes[k]);
-    own[3] = dot(to_bone.column[1], out.axes[k]);
-    const Vec3 about = cross(axis, out.axes[k]);
-    const double model = rod.model_tilt(s.empty);
-    Row<7> turn{};
-    for (std::size_t n = 0; n < 7; ++n) turn[n] = moves[3][n] * about.x + moves[4][n] * about.y + moves[5][n] * about.z;
-    const double variance = planning::carried<5, 1>({own}, rod.covariance)[0][0] +
-                            planning::carried<7, 1>({turn}, fragment.covariance)[0][0] + model * model;
-    out.tilt_deg[k] = {portable::atan2(tangent[k], 1) / kDeg, quantile * std::sqrt(variance) / kDeg};
-    out.direction_known = out.direction_known && out.tilt_deg[k].half <= params.max_unsure_deg;
-  }
-  out.angle_deg = portable::atan2(portable::hypot(tangent[0], tangent[1]), 1) / kDeg;
-  if (!out.known || !out.direction_known || !out.tip_known) out.why = "the interval is wider than what is accepted";
-  if (s.empty && out.known && out.direction_known && !rod.end_seen) out.why = "the CT shows no bottom of the hole";
-}
-
 }  // namespace
-}  // namespace rods
 
-void find_screws(Outcome& out, const SurgicalPlan& plan, const std::vector<std::optional<Fit>>& fits,
-                 const planning::EdgeReader& ct, const Image& postop, const OutcomeParams& params,
-                 const Context& context) {
-  using namespace rods;
-  if (plan.screws.empty()) return;
-  const Finder finder(ct, postop, params);
-  const std::size_t count = plan.screws.size();
-  std::vector<Wanted> wanted(count);
-  std::vector<std::optional<RodFit>> rods(count);
-  std::vector<std::size_t> of(count);
-  for (std::size_t n = 0; n < count; ++n) {
-    context.check_cancelled();
-    const PlannedScrew& s = plan.screws[n];
-    ScrewOutcome& o = out.screws.emplace_back();
-    o.name = s.name;
-    o.fragment = s.fragment;
-    o.empty = s.empty;
-    while (plan.fragments[of[n]].name != s.fragment) ++of[n];
-    if (!fits[of[n]] || fits[of[n]]->found < kMinFound) {
-      o.why = "its fragment is not found";
-      continue;
-    }
-    const Fit& fragment = *fits[of[n]];
-    Wanted& w = wanted[n];
-    w.screw = &s;
-    w.length = length(s.tip_mm - s.entry_mm);
-    w.radius = s.diameter_mm / 2;
-    const Vec3 along = normalized(s.tip_mm - s.entry_mm), x = any_perpendicular(along);
-    w.planned.at = fragment.pose(s.entry_mm);
-    w.planned.axes = {
-        {fragment.pose.rotation * x, fragment.pose.rotation * cross(along, x), fragment.pose.rotation * along}};
-    w.planned.blur = blur_of(fragment);
-    rods[n] = finder.find(w, {}, 0, o.why, o.found);
-  }
-  // One screw that two are planned at is that of the nearer; the other may have one of its own.
-  for (bool again = true; again;) {
-    again = false;
-    for (std::size_t a = 0; a < count && !again; ++a) {
-      for (std::size_t b = 0; b < count && !again; ++b) {
-        if (a == b || !rods[a] || !rods[b] || plan.screws[a].empty != plan.screws[b].empty) continue;
-        if (rods[b]->off < rods[a]->off || (rods[b]->off == rods[a]->off && b < a)) continue;  // a is the nearer
-        const Vec3 q = rods[a]->rod.local(rods[b]->rod.world({0, 0, rods[b]->middle}));
-        if (portable::hypot(q.x, q.y) > kSameRod * 2 * std::min(wanted[a].radius, wanted[b].radius)) continue;
-        if (q.z < -1 || q.z > rods[a]->rod.tip + 1) continue;
-        const double nearer = rods[a]->off, farther = rods[b]->off;
-        std::vector<Rod> taken;
-        for (std::size_t n = 0; n < count; ++n)
-          if (n != b && rods[n]) taken.push_back(rods[n]->rod);
-        out.screws[b].why.clear();
-        rods[b] = plan.screws[b].empty
-                      ? std::nullopt
-                      : finder.find(wanted[b], taken, wanted[a].radius, out.screws[b].why, out.screws[b].found);
-        again = true;
-        const bool same =
-            rods[b] && std::any_of(taken.begin(), taken.end(), [&](const Rod& t) {
-              const Vec3 p = t.local(rods[b]->rod.world({0, 0, rods[b]->middle}));
-              return portable::hypot(p.x, p.y) < kSameRod * 2 * wanted[b].radius && p.z > -1 && p.z < t.tip + 1;
-            });
-        if (same) rods[b].reset();
-        if (rods[b]) continue;
-        if (plan.screws[b].empty) {  // it was not looked for again
-          out.screws[b].found = true;
-          out.screws[b].why = kOneForTwo;
-        } else if (same || !out.screws[b].found) {
-          out.screws[b].found = false;
-          out.screws[b].why = "what is near the planned place is that of '" + plan.screws[a].name + "'";
-        }
-        if (farther - nearer >= kUndecidedMm) continue;
-        for (const std::size_t n : {a, b}) {
-          rods[n].reset();
-          out.screws[n].found = true;
-          out.screws[n].why = kOneForTwo;
-        }
-      }
-    }
-  }
-  for (std::size_t n = 0; n < count; ++n)
-    if (rods[n]) compare(out.screws[n], wanted[n], *rods[n], *fits[of[n]], params);
+double RodFit::model_tilt(bool empty) const {
+  return (empty ? kHoleModelDeg : plated ? kBesidePlate * kModelDeg : kModelDeg) * kDeg;
 }
 
-}  // namespace osteo::inline session::outcome
+RodFinder::RodFinder(const EdgeReader& ct, const Image& postop, const OutcomeParams& params)
+    : ct_(ct), postop_(postop), metal_(params.metal_hu), clip_(clip_of(postop)) {}
+
+std::optional<RodFit> RodFinder::find(const Wanted& w, const std::vector<Rod>& taken, double taken_radius,
+                                      std::string& why, bool& there) const {
+  return Search(ct_, postop_, metal_, clip_).find(w, taken, taken_radius, why, there);
+}
+
+}  // namespace osteo::inline session::outcome::rods
