@@ -128,10 +128,61 @@ TEST(EarAgreement, WhatTheScanDoesNotShowIsNotFound) {
   EXPECT_EQ(std::count(c.apart.begin(), c.apart.end(), 0), static_cast<std::ptrdiff_t>(c.apart.size()));
 }
 
+TEST(EarAgreement, WhatBothEarsLackIsDrawnByTheSidesOfItsNames) {
+  Labels l = labelled({kSinus, kCanal, kLabyrinth}, [](std::uint8_t t, Vec3) { return t != kSinus; });
+  l.structures[0].name = "sigmoid_sinus_left";
+  l.structures.push_back({.value = 60, .name = "Right Sigmoid Sinus"});
+  const EarComparison c = compare_with_ear(ear().ct, l);
+  const ComparedStructure &left = of(c, "sinus_left"), &right = of(c, "Right Sigmoid");
+  EXPECT_EQ(left.values, std::vector<std::uint8_t>{kSinus});
+  EXPECT_FALSE(left.labelled);
+  EXPECT_TRUE(left.found) << left.why;
+  // The scan is of the left ear.
+  EXPECT_FALSE(right.found);
+  EXPECT_NE(right.why, "");
+  EXPECT_GT(std::count(c.fused.span().begin(), c.fused.span().end(), kSinus), 4000);
+  EXPECT_EQ(std::count(c.fused.span().begin(), c.fused.span().end(), 60), 0);
+}
+
+/// Beside the ear its mirror image, as far away as the other ear is.
+template <class T>
+Volume<T> with_mirrored(const Volume<T>& one, T between) {
+  Frame f = one.frame;
+  const double low = f.origin_mm.x, step = f.spacing_mm.x;
+  const int nx = f.dims[0], right = static_cast<int>(std::lround((low + (nx - 1) * step) / step));
+  f.dims[0] = 2 * right + 1;
+  f.origin_mm.x = -right * step;
+  const auto v = make_voxels<T>(f.voxel_count());
+  std::fill_n(v.get(), f.voxel_count(), between);
+  const Volume<T> shape{f, v};
+  for (int k = 0; k < f.dims[2]; ++k)
+    for (int j = 0; j < f.dims[1]; ++j)
+      for (int i = 0; i < nx; ++i)
+        for (const int to : {right + static_cast<int>(std::lround(low / step)) + i,
+                             right - static_cast<int>(std::lround(low / step)) - i})
+          if (to >= 0 && to < f.dims[0]) v[static_cast<std::ptrdiff_t>(shape.offset(to, j, k))] = one.at(i, j, k);
+  return shape;
+}
+
+TEST(EarAgreement, BothEarsAreComparedWhereOneLabelIsOfBoth) {
+  Labels l = labelled({kLabyrinth}, kAll);
+  const std::vector<Structure> names = l.structures;
+  l = {with_mirrored<std::uint8_t>(l, 0), names};
+  const Image head{with_mirrored<std::int16_t>(ear().ct, 40)};
+  const EarComparison c = compare_with_ear(head, l);
+  const ComparedStructure& both = of(c, "labyrinth");
+  ASSERT_TRUE(both.found) << both.why;
+  EXPECT_GT(both.dice, 0.85);
+  EXPECT_TRUE(both.places.empty()) << both.places.front().at_mm.x;
+}
+
 TEST(EarAgreement, NamesThatAreNotKnownAreNotCompared) {
   Labels l = labelled({kCanal}, kAll);
-  l.structures.front().name = "mandible";
-  EXPECT_TRUE(compare_with_ear(ear().ct, l).structures.empty());
+  for (const char* const other : {"mandible", "internal ear canal", "labyrinthine artery", "sigmoid sinus segment",
+                                  "facial nerve labyrinthine segment", "artery of the labyrinth"}) {
+    l.structures.front().name = other;
+    EXPECT_TRUE(compare_with_ear(ear().ct, l).structures.empty()) << other;
+  }
   l.frame.origin_mm.x += 5;
   EXPECT_THROW(static_cast<void>(compare_with_ear(ear().ct, l)), Error);
 }

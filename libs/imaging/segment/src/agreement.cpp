@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
+#include <map>
 #include <optional>
 #include <string_view>
 
@@ -12,6 +12,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/param.h"
 #include "osteo/geometry/distance/binary_distance.h"
+#include "osteo/imaging/image/structures.h"
 #include "osteo/imaging/segment/ear.h"
 
 namespace osteo::inline imaging {
@@ -19,14 +20,9 @@ namespace {
 
 using namespace segment;
 
-constexpr double kBothEarsMm = 90;  // what is labelled reaches so far across: it is of both ears
-
-std::string plain(std::string_view name) {
-  std::string low = lower_case(std::string(name));
-  std::replace(low.begin(), low.end(), '_', ' ');
-  std::replace(low.begin(), low.end(), '-', ' ');
-  return low;
-}
+// Nine tenths of what is labelled reach so far across: it is of both ears. What lies in one ear alone, and all
+// together.
+constexpr double kBothEarsMm = 55, kBothSidesMm = 90;
 
 /// What of an ear is compared: the names of label maps, and how far outlines of two methods may lie apart. Chosen so
 /// that true labels of a phantom do not differ (EarAgreement.OfTrueLabelsNothingDiffers).
@@ -47,8 +43,49 @@ const std::vector<Kind>& kinds() {
 std::vector<const Structure*> named(const Labels& labels, std::string_view name) {
   std::vector<const Structure*> all;
   for (const Structure& s : labels.structures)
-    if (plain(s.name).find(name) != std::string::npos) all.push_back(&s);
+    if (is_called(s.name, name)) all.push_back(&s);
   return all;
+}
+
+/// The side that a structure's name says.
+std::optional<Side> side_of(const Structure& s) {
+  const std::string words = ' ' + plain_name(s.name) + ' ';
+  const auto has = [&](std::string_view word) { return words.find(word) != std::string::npos; };
+  const bool left = has(" left ") || has(" l "), right = has(" right ") || has(" r ");
+  if (left == right) return std::nullopt;
+  return left ? Side::left : Side::right;
+}
+
+/// What is compared at once: the labels of one kind, of one side where their names say which and both are there.
+struct Group {
+  const Kind* kind = nullptr;
+  std::optional<Side> side;
+  std::vector<const Structure*> labels;
+};
+
+/// None where one of the kind's names is missing.
+std::vector<Group> groups_of(const Labels& labels, const Kind& kind) {
+  std::array<Group, 2> sided{Group{&kind, Side::left, {}}, Group{&kind, Side::right, {}}};
+  Group all{&kind, std::nullopt, {}};
+  std::array<bool, 2> each{true, true};
+  bool by_side = true;
+  for (const std::string_view name : kind.names) {
+    const std::vector<const Structure*> these = named(labels, name);
+    if (these.empty()) return {};
+    std::array<bool, 2> there{};
+    for (const Structure* s : these) {
+      all.labels.push_back(s);
+      const auto side = side_of(*s);
+      by_side = by_side && side;
+      if (!side) continue;
+      const auto n = static_cast<std::size_t>(*side);
+      sided[n].labels.push_back(s);
+      there[n] = true;
+    }
+    each = {each[0] && there[0], each[1] && there[1]};
+  }
+  if (by_side && each[0] && each[1]) return {sided[0], sided[1]};
+  return {all};
 }
 
 std::size_t row_of(const Frame& f, int j, int k) {
@@ -92,6 +129,35 @@ std::size_t whole(const MaskBox& box, const Frame& f, std::size_t v) {
   return row_of(f, p[1] + box.lo[1], p[2] + box.lo[2]) + static_cast<std::size_t>(p[0] + box.lo[0]);
 }
 
+/// How far voxels reach across, but for the outermost twentieth on either side: specks do not count.
+class Spread {
+ public:
+  void add(double x) {
+    ++at_[static_cast<int>(std::floor(x))];
+    ++all_;
+  }
+  [[nodiscard]] std::array<double, 2> most() const {
+    std::array<double, 2> ends{};
+    std::size_t below = 0;
+    bool begun = false;
+    for (const auto& [x, count] : at_) {
+      if (!begun && 20 * (below + count) > all_) {
+        ends[0] = x;
+        begun = true;
+      }
+      if (20 * below < 19 * all_) ends[1] = x + 1;
+      below += count;
+    }
+    return ends;
+  }
+
+ private:
+  std::map<int, std::size_t> at_;
+  std::size_t all_ = 0;
+};
+
+constexpr std::uint8_t kOfRight = 100;
+
 class Comparison {
  public:
   Comparison(const Image& ct, const Labels& labels, const Context& context)
@@ -103,15 +169,12 @@ class Comparison {
   }
 
   EarComparison run() {
-    std::vector<const Kind*> known;
-    for (const Kind& k : kinds()) {
-      const bool there = std::all_of(k.names.begin(), k.names.end(),
-                                     [&](std::string_view name) { return !named(labels_, name).empty(); });
-      if (there) known.push_back(&k);
-    }
+    std::vector<Group> known;
+    for (const Kind& k : kinds())
+      for (Group& g : groups_of(labels_, k)) known.push_back(std::move(g));
     if (!known.empty()) {
       find(known);
-      for (const Kind* k : known) compare(*k);
+      for (const Group& g : known) compare(g);
     }
     out_.fused = labels_;
     out_.fused.voxels = voxels_;
@@ -131,30 +194,43 @@ class Comparison {
     bool both = false;  ///< both are there; else the second is looked for where the first is not found
     double middle_x = 0;
   };
-  Ears ears(const std::vector<const Kind*>& known) const {
+  Ears ears(const std::vector<Group>& known) const {
+    // By place across, in mm: what is compared, the canal, what lies inward of it, and what one ear has within 55 mm.
     constexpr std::array<std::string_view, 5> kInward{"labyrinth", "facial nerve", "tympanic cavity", "carotid",
                                                       "ossicle"};
+    constexpr std::array<std::string_view, 4> kNarrow{"labyrinth", "ear canal", "tympanic cavity", "ossicle"};
     std::array<bool, 256> counts{}, canal{}, inward{};
-    for (const Kind* k : known)
-      for (const std::string_view name : k->names)
-        for (const Structure* s : named(labels_, name)) counts[s->value] = true;
-    for (const Structure* s : named(labels_, "ear canal")) canal[s->value] = true;
-    for (const std::string_view name : kInward)
-      for (const Structure* s : named(labels_, name)) inward[s->value] = true;
-    double low = std::numeric_limits<double>::infinity(), high = -low;
+    std::array<std::size_t, 256> narrow{};  // 1 + which
+    for (const Group& g : known)
+      for (const Structure* s : g.labels) counts[s->value] = true;
+    for (const Structure& s : labels_.structures) {
+      canal[s.value] = is_called(s.name, "ear canal");
+      // Also their parts and vessels: they lie there as well.
+      for (const std::string_view name : kInward)
+        inward[s.value] = inward[s.value] || plain_name(s.name).find(name) != std::string::npos;
+      for (std::size_t n = 0; n < kNarrow.size(); ++n)
+        if (is_called(s.name, kNarrow[n])) narrow[s.value] = 1 + n;
+    }
+    std::array<Spread, 1 + kNarrow.size()> spread;  // first all that is compared
     std::array<double, 2> sum{}, count{};
     for (std::size_t v = 0; v < ct_.frame.voxel_count(); ++v) {
       const std::uint8_t value = labels_.voxels[v];
       if (!counts[value] && !canal[value] && !inward[value]) continue;
       const double x = place(v).x;
-      low = std::min(low, x);
-      high = std::max(high, x);
+      spread[0].add(x);
+      if (narrow[value] != 0) spread[narrow[value]].add(x);
       if (canal[value]) sum[0] += x, count[0] += 1;
       if (inward[value]) sum[1] += x, count[1] += 1;
     }
     Ears ears;
-    ears.middle_x = 0.5 * (low + high);
-    ears.both = high - low > kBothEarsMm;
+    for (std::size_t n = 0; n < spread.size(); ++n) {
+      const auto [low, high] = spread[n].most();
+      if (n == 0) ears.middle_x = 0.5 * (low + high);
+      if (high - low <= (n == 0 ? kBothSidesMm : kBothEarsMm)) continue;
+      ears.both = true;
+      ears.middle_x = 0.5 * (low + high);
+    }
+    for (const Group& g : known) ears.both = ears.both || g.side;
     if (ears.both || count[0] == 0 || count[1] == 0)
       ears.sides = {Side::left, Side::right};
     else
@@ -162,12 +238,13 @@ class Comparison {
     return ears;
   }
 
-  /// The label's deepest voxel on a side: in the vestibule, where it is a labyrinth.
-  std::optional<Vec3> deepest(const Ears& ears, Side side) {
+  /// The group's deepest voxel on a side: in the vestibule, where it is a labyrinth.
+  std::optional<Vec3> deepest(const Group& group, const Ears& ears, Side side) {
     std::array<bool, 256> is{};
-    for (const Structure* s : named(labels_, "labyrinth")) is[s->value] = true;
+    for (const Structure* s : group.labels) is[s->value] = true;
+    const bool split = ears.both && !group.side;
     auto box = box_of(ct_.frame, 1, [&](std::size_t v) {
-      return is[labels_.voxels[v]] && (!ears.both || (place(v).x > ears.middle_x) == (side == Side::left));
+      return is[labels_.voxels[v]] && (!split || (place(v).x > ears.middle_x) == (side == Side::left));
     });
     if (!box) return std::nullopt;
     for (std::size_t v = 0; v < box->in.size(); ++v) box->in[v] = is[labels_.voxels[whole(*box, ct_.frame, v)]] ? 1 : 0;
@@ -176,7 +253,7 @@ class Comparison {
     return box->world(best);
   }
 
-  void find(const std::vector<const Kind*>& known) {
+  void find(const std::vector<Group>& known) {
     found_.assign(ct_.frame.voxel_count(), 0);
     const Ears where = ears(known);
     for (std::size_t n = 0; n < where.sides.size(); ++n) {
@@ -184,56 +261,60 @@ class Comparison {
       EarParams params;
       params.side = where.sides[n];
       params.what.clear();
-      for (const Kind* k : known) {
-        if (k->what == EarStructure::labyrinth) {
-          const auto point = deepest(where, params.side);
+      for (const Group& g : known) {
+        if (g.side && *g.side != params.side) continue;
+        if (g.kind->what == EarStructure::labyrinth) {
+          const auto point = deepest(g, where, params.side);
           if (!point) continue;
-          for (std::size_t a = 0; a < 3; ++a) params.labyrinth_mm[a] = (*point)[a];
+          params.labyrinth_mm = {point->x, point->y, point->z};
         }
         params.what += (params.what.empty() ? "" : ",") +
-                       std::string(EnumNames<EarStructure>::values[static_cast<std::size_t>(k->what)]);
+                       std::string(EnumNames<EarStructure>::values[static_cast<std::size_t>(g.kind->what)]);
       }
-      if (params.what.empty()) return;
+      if (params.what.empty()) continue;
       const EarFindings ear = find_ear_structures(ct_, params, quiet_);
       bool any = false;
       for (const EarFinding& f : ear.findings) {
-        auto& known_of = findings_[static_cast<std::size_t>(f.what)];
-        if (!known_of || f.found) known_of = f;
+        findings_[static_cast<std::size_t>(params.side)][static_cast<std::size_t>(f.what)] = f;
         any = any || f.found;
       }
+      const std::uint8_t ofs = params.side == Side::right ? kOfRight : 0;
       for (std::size_t v = 0; v < found_.size(); ++v)
-        if (ear.labels.voxels[v] != 0) found_[v] = ear.labels.voxels[v];
+        if (ear.labels.voxels[v] != 0) found_[v] = static_cast<std::uint8_t>(ofs + ear.labels.voxels[v]);
       if (any && !where.both) return;
     }
   }
 
-  void compare(const Kind& kind) {
+  void compare(const Group& group) {
     ComparedStructure c;
-    std::array<bool, 256> is{};
-    for (const std::string_view name : kind.names) {
-      for (const Structure* s : named(labels_, name)) {
-        c.name += (c.name.empty() ? "" : " and ") + s->name;
-        c.values.push_back(s->value);
-        is[s->value] = true;
-      }
+    std::array<bool, 256> is{}, exact{};
+    for (const Structure* s : group.labels) {
+      c.name += (c.name.empty() ? "" : " and ") + s->name;
+      c.values.push_back(s->value);
+      is[s->value] = true;
     }
-    const auto exact = static_cast<std::uint8_t>(1 + static_cast<int>(kind.what));
-    const std::optional<EarFinding>& finding = findings_[static_cast<std::size_t>(kind.what)];
-    auto box = box_of(ct_.frame, 1, [&](std::size_t v) { return is[labels_.voxels[v]] || found_[v] == exact; });
+    std::string why;
+    for (const Side side : {Side::right, Side::left}) {
+      if (group.side && *group.side != side) continue;
+      const auto& finding = findings_[static_cast<std::size_t>(side)][static_cast<std::size_t>(group.kind->what)];
+      if (finding && !finding->why.empty()) why = finding->why;
+      exact[(side == Side::right ? kOfRight : 0U) + 1U + static_cast<std::size_t>(group.kind->what)] = true;
+    }
+    auto box = box_of(ct_.frame, 1, [&](std::size_t v) { return is[labels_.voxels[v]] || exact[found_[v]]; });
     if (box) {
       MaskBox other = *box;
       std::size_t ours = 0, theirs = 0;
       for (std::size_t v = 0; v < box->in.size(); ++v) {
         const std::size_t w = whole(*box, ct_.frame, v);
         box->in[v] = is[labels_.voxels[w]] ? 1 : 0;
-        other.in[v] = found_[w] == exact ? 1 : 0;
+        other.in[v] = exact[found_[w]] ? 1 : 0;
         ours += box->in[v];
         theirs += other.in[v];
       }
       c.labelled = ours > 0;
       c.found = theirs > 0;
       if (c.labelled && c.found) {
-        const SurfaceDifference d = difference(*box, other, kind.tolerance, quiet_);
+        const SurfaceDifference d = difference(*box, other, group.kind->tolerance, quiet_);
         c.dice = d.dice;
         c.within_mm = d.within_mm;
         c.places = d.places;
@@ -243,7 +324,7 @@ class Comparison {
         draw_found(*box, other, c.values.front());
       }
     }
-    if (!c.found) c.why = finding && !finding->why.empty() ? finding->why : std::string("nothing to look for it by");
+    if (!c.found) c.why = !why.empty() ? why : std::string("nothing to look for it by");
     out_.structures.push_back(std::move(c));
   }
 
@@ -264,8 +345,8 @@ class Comparison {
   const Context& context_;
   Context quiet_;
   std::shared_ptr<std::uint8_t[]> voxels_;
-  std::vector<std::uint8_t> found_;
-  std::array<std::optional<EarFinding>, kEarStructures> findings_;
+  std::vector<std::uint8_t> found_;  // 1 + EarStructure, and kOfRight more on the right
+  std::array<std::array<std::optional<EarFinding>, kEarStructures>, 2> findings_;  // of left and right
   EarComparison out_;
 };
 

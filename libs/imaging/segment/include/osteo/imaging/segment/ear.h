@@ -7,6 +7,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,7 +34,7 @@ struct EarParams {
   Side side = Side::left;
   std::string what =
       "ear_canal,air_cells,sigmoid_sinus,tegmen,dura";  ///< names of EarStructure, with commas; "all" for all
-  std::array<double, 3> labyrinth_mm{0, 0, 0};          ///< a point within the labyrinth, LPS; needed for it
+  std::optional<std::array<double, 3>> labyrinth_mm;    ///< a point within the labyrinth, LPS; needed for it
   double min_quality = 0.3;                             ///< what is below is not found
 };
 
