@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
+#include "osteo/core/base/error.h"
 #include "osteo/imaging/image/phantom.h"
 
 namespace osteo {
@@ -108,6 +110,25 @@ TEST(Agreement, WhatBothDrawIsSaidAndNotDoubted) {
     EXPECT_EQ(is.within_mm, 1.2) << is.name;
   }
   EXPECT_NE(reported(context, "agreement").find("sigmoid sinus within"), std::string::npos);
+}
+
+TEST(Agreement, WhatGoesWrongInComparingDoesNotLoseWhatTheNetworkFound) {
+  Subject s = sinus_with_ball(false);
+  s.ct.frame.origin_mm.x += 5;  // not the labels' own any more
+  const auto before = s.found.structures.voxels;
+  std::string warned;
+  Context heard;
+  heard.on_log([&](LogLevel, std::string_view text) { warned += text; });
+  EXPECT_NO_THROW(join_with_exact(s.ct, s.found, heard));
+  EXPECT_NE(warned.find("were not compared"), std::string::npos) << warned;
+  EXPECT_EQ(s.found.structures.voxels, before);
+  EXPECT_EQ(s.found.structures.structures[0].doubt, "");
+  // Whoever ends the run ends it here as well.
+  Subject again = sinus_with_ball(false);
+  const std::atomic<bool> cancelled{true};
+  Context stopped;
+  stopped.set_cancel_flag(&cancelled);
+  EXPECT_THROW(join_with_exact(again.ct, again.found, stopped), Error);
 }
 
 TEST(Agreement, NothingIsDoneWithoutNamesThatAreKnown) {

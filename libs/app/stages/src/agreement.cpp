@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "osteo/core/base/error.h"
 #include "osteo/core/base/param.h"
 #include "osteo/display/view/slices.h"
 #include "osteo/imaging/segment/ear.h"
@@ -74,7 +75,18 @@ class Joining {
 }  // namespace
 
 void join_with_exact(const Image& ct, NetworkLabels& found, const Context& context) {
-  Joining joining(found, compare_with_ear(ct, found.structures, context));
+  EarComparison compared;
+  try {
+    compared = compare_with_ear(ct, found.structures, context);
+  } catch (const std::exception& e) {
+    // What the network has found stays, whatever a comparison runs into.
+    if (const auto* const error = dynamic_cast<const Error*>(&e);
+        error != nullptr && error->code() == ExitCode::cancelled)
+      throw;
+    context.warn(std::string("the network's structures were not compared with find-structures: ") + e.what());
+    return;
+  }
+  Joining joining(found, std::move(compared));
   const std::vector<ComparedStructure>& all = joining.compared().structures;
   if (all.empty()) return;
   joining.run();
