@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "edit_subject.h"
@@ -314,6 +315,40 @@ TEST(EditDocument, StructuresOfALabelMapAreOneStep) {
   EXPECT_EQ(d.steps(), 3U);
   found.frame.origin_mm.x += 1;
   EXPECT_THROW(static_cast<void>(structures_of(found, d)), Error);
+}
+
+// What a network says of a structure goes along into the file, and files of before have none of it.
+TEST(EditFile, WhatAProgramSaysOfAStructureIsKept) {
+  const Image ct = walnut({20, 18, 16});
+  EditDocument d(ct, start_of(ct, 300));
+  Labels found;
+  found.frame = ct.frame;
+  const auto v = make_voxels<std::uint8_t>(ct.frame.voxel_count());
+  std::fill_n(v.get(), ct.frame.voxel_count(), std::uint8_t{0});
+  v[100] = 1, v[200] = 2;
+  found.voxels = v;
+  found.structures = {
+      {.value = 1, .name = "nerve", .origin = "a network, version 1", .within_mm = 0.6, .doubt = "short \"x\""},
+      {.value = 2,
+       .name = "sinus",
+       .origin = "a network, version 1",
+       .within_mm = std::numeric_limits<double>::infinity()}};
+  d.apply_together(structures_of(found, d), "structures by a network");
+  d.apply(AddStructureEdit{9, "drawn", {1, 2, 3}, StructureRole::at_risk});
+  const std::string text = edits_text(recipe_of(d));
+  std::vector<AddStructureEdit> read;
+  for (const EditOperation& o : parse_edits(text, "edits.json").operations)
+    if (const auto* const add = std::get_if<AddStructureEdit>(&o)) read.push_back(*add);
+  ASSERT_EQ(read.size(), 3U);
+  EXPECT_EQ(read[0].origin, "a network, version 1");
+  EXPECT_EQ(read[0].within_mm, 0.6);
+  EXPECT_EQ(read[0].doubt, "short \"x\"");
+  EXPECT_LT(read[1].within_mm, 0);
+  EXPECT_EQ(read[1].doubt, "");
+  EXPECT_EQ(read[2].origin, "");
+  // As files of before have it.
+  const std::string drawn = text.substr(text.find("drawn"));
+  EXPECT_EQ(drawn.find("origin"), std::string::npos) << drawn;
 }
 
 TEST(EditDocument, TakesOverStructuresAlsoFromAnotherGrid) {

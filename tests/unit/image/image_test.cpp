@@ -383,6 +383,44 @@ TEST(Structures, AShapeThatItsNameCannotHaveIsTold) {
   EXPECT_EQ(said(cut), "");
 }
 
+// One label of both inner ears, which lie 80 mm apart: neither is taken for the other's half that came off.
+TEST(Structures, ALabelOfBothSidesIsLookedAtSideBySide) {
+  const auto rods = [](double right_mm, double left_mm, double apart_mm, const std::string& name) {
+    Labels l;
+    l.frame = {{200, 20, 90}, {0.5, 0.5, 0.5}, {-50, 3, 7}, {}};
+    const auto v = make_voxels<std::uint8_t>(l.frame.voxel_count());
+    std::size_t n = 0;
+    for (int k = 0; k < l.frame.dims[2]; ++k)
+      for (int j = 0; j < l.frame.dims[1]; ++j)
+        for (int i = 0; i < l.frame.dims[0]; ++i, ++n) {
+          const Vec3 p = Vec3{double(i) - 100, double(j) - 10, double(k) - 5} * 0.5;
+          const double off = std::hypot(std::abs(p.x) - apart_mm / 2, p.y);
+          v[static_cast<std::ptrdiff_t>(n)] = off < 1.6 && p.z >= 0 && p.z < (p.x < 0 ? right_mm : left_mm) ? 3 : 0;
+        }
+    l.voxels = v;
+    l.structures = {{.value = 3, .name = name}};
+    return l;
+  };
+  const auto said = [](const Labels& l) { return implausible_shape(l, l.structures.front()); };
+  EXPECT_EQ(said(rods(22, 22, 76, "labyrinth")), "");
+  EXPECT_EQ(said(rods(22, 18, 70, "labyrinth")), "");
+  EXPECT_NE(said(rods(22, 10, 76, "labyrinth")).find("mm of length"), std::string::npos) << "the left is short";
+  EXPECT_NE(said(rods(22, 22, 20, "labyrinth")).find("50 % of its volume"), std::string::npos) << "one ear's";
+}
+
+TEST(Structures, NamesAreTakenWordByWord) {
+  for (const char* const name : {"labyrinth", "Labyrinth_L", "left labyrinth", "labyrinth, right"})
+    EXPECT_TRUE(is_called(name, "labyrinth")) << name;
+  EXPECT_TRUE(is_called("Ossicles", "ossicle"));
+  EXPECT_TRUE(is_called("external ear canal", "ear canal"));
+  for (const char* const name : {"labyrinthine artery", "artery of labyrinth", "labyrinth segment of a nerve"})
+    EXPECT_FALSE(is_called(name, "labyrinth")) << name;
+  EXPECT_FALSE(is_called("internal ear canal", "ear canal"));
+  EXPECT_FALSE(structure_limits("facial nerve labyrinthine segment").has_value());
+  EXPECT_FALSE(structure_limits("labyrinthine artery").has_value());
+  EXPECT_TRUE(structure_limits("Facial_Nerve-L").has_value());
+}
+
 TEST(Structures, AVolumeThatItsNameCannotHaveIsTold) {
   EXPECT_EQ(implausible_volume("facial nerve", 80), "");
   EXPECT_NE(implausible_volume("Left Facial_Nerve", 4000).find("look at it"), std::string::npos);

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <random>
 
-#include "folders.h"
+#include "golden.h"
 #include "osteo/core/base/files.h"
 
 namespace osteo {
@@ -86,7 +86,7 @@ TEST(NetworkCheckpoint, MutationsAreReadOrRefused) {
   const std::size_t pickle = find(whole, "network_weights"), directory = whole.size() - 3000;
   std::mt19937 random(11);
   int refused = 0, read_well = 0;
-  for (int n = 0; n < 1500; ++n) {
+  for (int n = 0; n < mutations(); ++n) {
     auto bytes = whole;
     const int changes = 1 + static_cast<int>(random() % 4);
     for (int c = 0; c < changes; ++c) {

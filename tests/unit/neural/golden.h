@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <set>
 
 #include "folders.h"
@@ -16,6 +17,12 @@ namespace osteo {
 
 inline fs::path golden(const std::string& name) {
   return source_folder() / "testdata/neural" / name;
+}
+
+/// Of a damaged file: more of them by OSTEO_MUTATIONS, for a run by hand.
+inline int mutations() {
+  const char* const given = std::getenv("OSTEO_MUTATIONS");
+  return given != nullptr ? std::atoi(given) : 1500;
 }
 
 struct Agreement {

@@ -266,6 +266,11 @@ TEST(Ear, LabyrinthFromAPoint) {
     ASSERT_TRUE(f.findings[0].found) << f.findings[0].why;
     EXPECT_GT(overlap(f.labels, 6, truth).dice, 0.8);
   }
+  // Nor need it lie elsewhere than where the scanner's coordinates begin.
+  Image moved = phantom.ct;
+  moved.frame.origin_mm = moved.frame.origin_mm - Vec3{kVestibule[0], kVestibule[1], kVestibule[2]};
+  p.labyrinth_mm = {0, 0, 0};
+  EXPECT_TRUE(find_ear_structures(moved, p).findings[0].found);
   // In bone, in the ear canal, in the brain.
   for (const std::array<double, 3> wrong : {std::array<double, 3>{62, 8, -12}, {55, 3, -19}, {35, 5, 8}}) {
     p.labyrinth_mm = wrong;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <nlohmann/json.hpp>
 
@@ -73,6 +74,54 @@ TEST(ApplyEdits, StructuresKnowTheHandsThatChangedThem) {
   for (std::size_t n = 1; n < 4; ++n) {
     EXPECT_EQ(made.structures[n].within_mm, 0) << n;
     EXPECT_EQ(made.structures[n].doubt, "") << n;
+  }
+}
+
+// A network's structure in the editor keeps what the network says of it, until a hand changes it.
+TEST(ApplyEdits, WhatANetworkFoundInTheEditorKeepsItsDoubts) {
+  Image ct;
+  ct.frame.dims = {12, 12, 12};
+  const std::size_t n = ct.frame.voxel_count();
+  const auto hu = make_voxels<std::int16_t>(n);
+  const auto mask = make_voxels<std::uint8_t>(n), map = make_voxels<std::uint8_t>(n),
+             nets = make_voxels<std::uint8_t>(n);
+  for (std::size_t v = 0; v < n; ++v) {
+    hu[v] = 500;
+    mask[v] = 1;
+    map[v] = static_cast<std::uint8_t>(v < 144 ? 5 : 0);
+    nets[v] = static_cast<std::uint8_t>(v < 100 ? 1 : v >= 600 && v < 660 ? 2 : v >= 1500 ? 3 : 0);
+  }
+  ct.voxels = hu;
+  const std::string by = "segment-network, version 4";
+  const double far = std::numeric_limits<double>::infinity();
+  const Labels bone{{ct.frame, mask}, {}}, before{{ct.frame, map}, {{5, "sinus", {1, 1, 1}, "tube, version 2", 0.3}}},
+      found{{ct.frame, nets},
+            {{1, "sinus", {1, 1, 1}, by, 1.2, "differs from find-structures"},
+             {2, "labyrinth", {2, 2, 2}, by, far, "too short"},
+             {3, "ear canal", {3, 3, 3}, by, 0.6, "not that of a phantom"}}};
+  EditDocument document(ct, bone, &before);
+  document.apply_together(structures_of(found, document), "structures by a network");
+  int canal = 0;
+  for (const EditStructure& s : document.structures())
+    if (s.is.name == "ear canal") canal = s.is.value;
+  document.apply(BrushEdit{canal, false, 1.5, {{5, 5, 8}}});
+  const std::vector<Data> inputs{ct, bone, Document{edits_text(recipe_of(document))}, before};
+  const auto made = std::get<Labels>(ApplyEditsStage::run({}, inputs, {})[1]);
+  ASSERT_EQ(made.structures.size(), 3u);
+  for (const Structure& s : made.structures) {
+    if (s.name == "sinus") {
+      EXPECT_EQ(s.origin, by);
+      EXPECT_EQ(s.within_mm, 1.2);
+      EXPECT_EQ(s.doubt, "differs from find-structures");
+    } else if (s.name == "labyrinth") {
+      EXPECT_EQ(s.origin, by);
+      EXPECT_EQ(s.within_mm, far);
+      EXPECT_EQ(s.doubt, "too short");
+    } else {
+      EXPECT_EQ(s.origin, by + ", corrected by hand");
+      EXPECT_EQ(s.within_mm, 0);
+      EXPECT_EQ(s.doubt, "");
+    }
   }
 }
 

@@ -391,6 +391,19 @@ TEST(EditControl, WhatANetworkFindsIsOneStepAndItsDoubtfulPlacesAreListed) {
   e.settle();
   EXPECT_EQ(e.control.message(), "no network there");
   EXPECT_EQ(e.document.steps(), 0U);
+  // What a run reported before it ended so is not the next one's.
+  e.control.find_structures("structures by ear", [](const Context& context) -> EditFound {
+    context.report("disagreement", std::string("of the first run"));
+    throw Error(ExitCode::cancelled, "stopped");
+  });
+  e.settle();
+  std::size_t reported = 99;
+  e.control.find_structures("structures by ear", [&](const Context& context) {
+    reported = context.take_report().size();
+    return found;
+  });
+  e.settle();
+  EXPECT_EQ(reported, 0U);
 }
 
 TEST(EditWorker, TheLatestPictureWins) {

@@ -1,23 +1,57 @@
 #include "edit.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
+#include <string>
 
 namespace osteo::inline app {
 namespace {
 
-// What a person has drawn or changed says so from then on. `before`: the labels that the edits began with.
+/// A structure that an edit has made anew: what was said of it, and the voxels that a program gave it.
+struct Made {
+  const AddStructureEdit* as = nullptr;
+  const VoxelsEdit* voxels = nullptr;
+};
+
+std::array<Made, 256> made_by(const EditRecipe& recipe) {
+  std::array<Made, 256> made;
+  for (const EditOperation& o : recipe.operations) {
+    if (const auto* const add = std::get_if<AddStructureEdit>(&o))
+      made[static_cast<std::size_t>(add->structure)] = {add, nullptr};
+    else if (const auto* const gone = std::get_if<DeleteStructureEdit>(&o))
+      made[static_cast<std::size_t>(gone->structure)] = {};
+    else if (const auto* const voxels = std::get_if<VoxelsEdit>(&o))
+      made[static_cast<std::size_t>(voxels->structure)].voxels = voxels;
+  }
+  return made;
+}
+
+/// Whether a structure's voxels are still those that the program gave it.
+bool as_given(const Labels& structures, std::uint8_t value, const VoxelsEdit& given) {
+  return voxels_of(structures, value, value).runs == given.runs;
+}
+
+// What a person has drawn or changed says so from then on; what a program has found, and nobody has changed, keeps what
+// the program says of it. `before`: the labels that the edits began with.
 void note_hands(Labels& structures, const std::vector<std::uint8_t>& before, const EditRecipe& recipe) {
-  std::array<bool, 256> was{}, changed{}, found{};
-  for (const EditOperation& o : recipe.operations)
-    if (const auto* const voxels = std::get_if<VoxelsEdit>(&o))
-      found[static_cast<std::size_t>(voxels->structure)] = true;  // by a tool of the editor, which is not recorded
+  std::array<bool, 256> was{}, changed{};
+  const std::array<Made, 256> made = made_by(recipe);
   for (std::size_t v = 0; v < before.size(); ++v) {
     was[before[v]] = true;
     if (before[v] != structures.voxels[v]) changed[before[v]] = changed[structures.voxels[v]] = true;
   }
   for (Structure& s : structures.structures) {
+    const auto& [as, voxels] = made[s.value];
+    if (as != nullptr && voxels != nullptr && !as->origin.empty()) {
+      const bool kept = as_given(structures, s.value, *voxels);
+      s.origin = as->origin + (kept ? "" : std::string(kCorrectedByHand));
+      s.doubt = kept ? as->doubt : "";
+      s.within_mm = !kept ? 0 : as->within_mm < 0 ? std::numeric_limits<double>::infinity() : as->within_mm;
+      continue;
+    }
     if (!was[s.value])
-      s.origin = found[s.value] ? "" : kDrawnByHand;
+      s.origin = voxels != nullptr ? "" : kDrawnByHand;  // by a tool of the editor, which is not recorded
     else if (changed[s.value] && !s.origin.empty() && s.origin != kDrawnByHand && !s.origin.ends_with(kCorrectedByHand))
       s.origin += kCorrectedByHand;
     if (!was[s.value] || changed[s.value]) {  // what was said of its boundary was said of another
@@ -31,7 +65,7 @@ void note_hands(Labels& structures, const std::vector<std::uint8_t>& before, con
 
 StageInfo ApplyEditsStage::info() {
   return {.name = "apply-edits",
-          .version = 2,
+          .version = 3,
           .synopsis = "corrections made by hand in 'osteo edit', done again on a mask",
           .description =
               "Does what edits.json holds, in order and to the bit: thresholds, fragments, boxes, cavities, smoothing, "

@@ -200,7 +200,10 @@ std::vector<Missing> missing_by_reason(const std::vector<EarFinding>& findings) 
 
 }  // namespace
 
-std::vector<Data> FindStructuresStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
+std::vector<Data> FindStructuresStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  EarParams p = params.ear;
+  // As the flag says: the scanner's zero is no point that anybody gives.
+  if (params.labyrinth_mm != std::array<double, 3>{}) p.labyrinth_mm = params.labyrinth_mm;
   const EarFindings found = find_ear_structures(std::get<Image>(inputs[0]), p, context);
   Json j;
   j["side"] = EnumNames<Side>::values[static_cast<std::size_t>(p.side)];

@@ -46,14 +46,17 @@ struct TubeStage {
 };
 
 struct FindStructuresStage {
-  using Params = EarParams;
+  struct Params {
+    EarParams ear;
+    std::array<double, 3> labyrinth_mm{0, 0, 0};
+  };
   static void describe(Params& p, auto& visit) {
-    visit({"side", "the patient's"}, p.side);
+    visit({"side", "the patient's"}, p.ear.side);
     visit({"what", "what to find, with commas: ear_canal, air_cells, sigmoid_sinus, tegmen, dura, labyrinth; or all"},
-          p.what);
+          p.ear.what);
     visit({"labyrinth_mm", "a point within the labyrinth, in its vestibule, LPS (0,0,0: none given)", "mm"},
           p.labyrinth_mm);
-    visit({"min_quality", "what is found with less is not written (0: everything is)", "", 0, 1}, p.min_quality);
+    visit({"min_quality", "what is found with less is not written (0: everything is)", "", 0, 1}, p.ear.min_quality);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

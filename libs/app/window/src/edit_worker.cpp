@@ -135,6 +135,7 @@ void EditWorker::plan_loop() {
       job = std::exchange(job_, std::nullopt);
     }
     Planned done;
+    static_cast<void>(context.take_report());  // of a run that was stopped
     try {
       if (job->find)
         done.found = job->find(context);

@@ -366,6 +366,9 @@ std::vector<EditOperation> structures_of(const Labels& labels, const EditDocumen
     AddStructureEdit add;
     add.name = found.name;
     add.rgb = {found.rgb[0], found.rgb[1], found.rgb[2]};
+    add.origin = found.origin;
+    add.doubt = found.doubt;
+    add.within_mm = std::isfinite(found.within_mm) ? found.within_mm : -1;
     if (same != now.end()) {
       add.structure = same->is.value;
       add.rgb = {same->is.rgb[0], same->is.rgb[1], same->is.rgb[2]};

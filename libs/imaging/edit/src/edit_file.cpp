@@ -30,6 +30,12 @@ const std::vector<EditOperation>& all_kinds() {
   return kinds;
 }
 
+/// A field of what a program says of the structure it found: files that were written before have none.
+bool said_by_program(const EditOperation& operation, std::string_view field) {
+  return std::holds_alternative<AddStructureEdit>(operation) &&
+         (field == "origin" || field == "within_mm" || field == "finding");
+}
+
 EditOperation read_operation(const JsonFile& file, const JsonValue& j, const std::string& where) {
   const JsonValue& does = file.need(j, where, "do");
   const std::string& name = file.text(does, where + ": \"do\"");
@@ -44,7 +50,8 @@ EditOperation read_operation(const JsonFile& file, const JsonValue& j, const std
   }
   EditOperation operation = *kind;
   std::vector<FieldRef> fields = operation_fields(operation);
-  for (FieldRef& f : fields) f.doc.needed = true;  // nothing is filled in: what is done again is what was written
+  // Nothing is filled in: what is done again is what was written.
+  for (FieldRef& f : fields) f.doc.needed = !said_by_program(operation, f.doc.name);
   auto* const brush = std::get_if<BrushEdit>(&operation);
   std::vector<std::string> besides{"do"};
   if (brush != nullptr) besides.emplace_back("points_mm");
@@ -79,7 +86,10 @@ Json edits_json(const EditRecipe& recipe) {
   Json operations = Json::list();
   for (EditOperation o : recipe.operations) {
     Json j{{"do", operation_name(o)}};
-    for (const FieldRef& f : operation_fields(o)) j[f.doc.name] = value_of(f);
+    const auto* const add = std::get_if<AddStructureEdit>(&o);
+    const bool says = add != nullptr && !(add->origin.empty() && add->doubt.empty() && add->within_mm == 0);
+    for (const FieldRef& f : operation_fields(o))
+      if (says || !said_by_program(o, f.doc.name)) j[f.doc.name] = value_of(f);
     if (const auto* const brush = std::get_if<BrushEdit>(&o)) {
       Json points = Json::list();
       for (const Vec3 p : brush->points_mm) points.push_back({p.x, p.y, p.z});

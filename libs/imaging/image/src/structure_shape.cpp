@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <queue>
 #include <utility>
 #include <vector>
@@ -15,8 +16,10 @@
 namespace osteo::inline imaging {
 namespace {
 
-constexpr double kBothSidesMm = 90;
-constexpr double kInOnePiece = 0.75;  // of the voxels: specks beside it are another matter
+constexpr double kBothSidesMm = 90;    // one piece that reaches so far across is of both sides
+constexpr double kSidesApartMm = 40;   // as are two whose middles lie so far apart: inner ears lie 70 to 86 mm apart
+constexpr double kShareOfASide = 0.2;  // of the voxels: what is less is a part that came off
+constexpr double kInOnePiece = 0.75;   // of the voxels: specks beside it are another matter
 
 /// A piece of a structure in a box of its own, with a margin of one voxel: where its voxels stand in `list`, or none.
 struct Piece {
@@ -91,6 +94,64 @@ Piece piece_of(const Components& all, std::size_t which, int rows) {
   return piece;
 }
 
+/// Of the voxels of a value whose place along the world's x lies in [from_x, to_x).
+std::vector<Run> runs_of(const Labels& labels, std::uint8_t value, double from_x, double to_x) {
+  const Frame& f = labels.frame;
+  std::vector<Run> runs;
+  for (int k = 0; k < f.dims[2]; ++k) {
+    for (int j = 0; j < f.dims[1]; ++j) {
+      const std::size_t row = labels.offset(0, j, k);
+      for (int i = 0; i < f.dims[0]; ++i) {
+        if (labels.voxels[row + static_cast<std::size_t>(i)] != value) continue;
+        const double x = f.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}).x;
+        if (x < from_x || x >= to_x) continue;
+        const auto at = static_cast<std::uint32_t>(i), line = static_cast<std::uint32_t>(j + k * f.dims[1]);
+        if (!runs.empty() && runs.back().row == line && runs.back().end == at)
+          ++runs.back().end;
+        else
+          runs.push_back({at, at + 1, line});
+      }
+    }
+  }
+  return runs;
+}
+
+/// Where the left and the right of a structure part along the world's x; nothing when it is of one side.
+std::optional<double> between_sides(const Labels& labels, std::uint8_t value) {
+  const Frame& f = labels.frame;
+  std::vector<Run> runs = runs_of(labels, value, -1e9, 1e9);
+  if (runs.empty()) return std::nullopt;
+  const Components all = connected_components(std::move(runs), f.dims, Connectivity::full);
+  double low = std::numeric_limits<double>::infinity(), high = -low, total = 0;
+  std::vector<std::pair<double, double>> pieces(all.voxels.size(), {0, 0});  // middle along x, voxels
+  for (std::size_t r = 0; r < all.runs.size(); ++r) {
+    const Run& run = all.runs[r];
+    const auto x = [&](double i) {
+      return f
+          .world_from_index({i, static_cast<double>(static_cast<int>(run.row) % f.dims[1]),
+                             static_cast<double>(static_cast<int>(run.row) / f.dims[1])})
+          .x;
+    };
+    const double begin = x(run.begin), end = x(run.end - 1.0), voxels = run.end - run.begin;
+    low = std::min({low, begin, end});
+    high = std::max({high, begin, end});
+    total += voxels;
+    pieces[all.component[r]].first += 0.5 * (begin + end) * voxels;
+    pieces[all.component[r]].second += voxels;
+  }
+  for (auto& [middle, voxels] : pieces) middle /= voxels;
+  std::sort(pieces.begin(), pieces.end());
+  double below = 0;
+  for (std::size_t n = 0; n + 1 < pieces.size(); ++n) {
+    below += pieces[n].second;
+    const bool both = below >= kShareOfASide * total && total - below >= kShareOfASide * total;
+    if (both && pieces[n + 1].first - pieces[n].first > kSidesApartMm)
+      return 0.5 * (pieces[n].first + pieces[n + 1].first);
+  }
+  if (high - low > kBothSidesMm) return 0.5 * (low + high);
+  return std::nullopt;
+}
+
 std::string tenths(double x) {
   return format_number(std::round(x * 10) / 10);
 }
@@ -121,25 +182,13 @@ std::string reason(const StructureShape& s, const StructureLimits& limits) {
 StructureShape shape_of(const Labels& labels, std::uint8_t value, double from_x, double to_x) {
   const Frame& f = labels.frame;
   StructureShape shape;
-  std::vector<Run> runs;
+  std::vector<Run> runs = runs_of(labels, value, from_x, to_x);
   double count = 0;
-  for (int k = 0; k < f.dims[2]; ++k) {
-    for (int j = 0; j < f.dims[1]; ++j) {
-      const std::size_t row = labels.offset(0, j, k);
-      for (int i = 0; i < f.dims[0]; ++i) {
-        if (labels.voxels[row + static_cast<std::size_t>(i)] != value) continue;
-        const double x = f.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}).x;
-        if (x < from_x || x >= to_x) continue;
-        const auto at = static_cast<std::uint32_t>(i), line = static_cast<std::uint32_t>(j + k * f.dims[1]);
-        if (!runs.empty() && runs.back().row == line && runs.back().end == at)
-          ++runs.back().end;
-        else
-          runs.push_back({at, at + 1, line});
-        count += 1;
-        const std::array<int, 3> p{i, j, k};
-        for (std::size_t a = 0; a < 3; ++a) shape.cut_off = shape.cut_off || p[a] == 0 || p[a] == f.dims[a] - 1;
-      }
-    }
+  for (const Run& run : runs) {
+    count += run.end - run.begin;
+    const int j = static_cast<int>(run.row) % f.dims[1], k = static_cast<int>(run.row) / f.dims[1];
+    shape.cut_off = shape.cut_off || run.begin == 0 || static_cast<int>(run.end) == f.dims[0] || j == 0 ||
+                    j == f.dims[1] - 1 || k == 0 || k == f.dims[2] - 1;
   }
   if (runs.empty()) return shape;
   const Components all = connected_components(std::move(runs), f.dims, Connectivity::full);
@@ -158,27 +207,13 @@ StructureShape shape_of(const Labels& labels, std::uint8_t value, double from_x,
 std::string implausible_shape(const Labels& labels, const Structure& structure) {
   const auto limits = structure_limits(structure.name);
   if (!limits) return {};
-  const Frame& f = labels.frame;
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  std::size_t v = 0;
-  for (int k = 0; k < f.dims[2]; ++k) {
-    for (int j = 0; j < f.dims[1]; ++j) {
-      for (int i = 0; i < f.dims[0]; ++i, ++v) {
-        if (labels.voxels[v] != structure.value) continue;
-        const double x = f.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}).x;
-        low = std::min(low, x);
-        high = std::max(high, x);
-      }
-    }
-  }
-  if (high < low) return {};
-  const double middle = 0.5 * (low + high);
+  const std::optional<double> middle = between_sides(labels, structure.value);
   std::string why;
-  if (high - low > kBothSidesMm) {
-    why = reason(shape_of(labels, structure.value, -1e9, middle), *limits);
-    if (why.empty()) why = reason(shape_of(labels, structure.value, middle, 1e9), *limits);
-  } else {
-    why = reason(shape_of(labels, structure.value), *limits);
+  if (middle) {
+    why = reason(shape_of(labels, structure.value, -1e9, *middle), *limits);
+    if (why.empty()) why = reason(shape_of(labels, structure.value, *middle, 1e9), *limits);
+  } else if (const StructureShape shape = shape_of(labels, structure.value); shape.volume_mm3 > 0) {
+    why = reason(shape, *limits);
   }
   return why.empty() ? why : structure.name + " has " + why + ": look at it, or at its name";
 }

@@ -67,12 +67,33 @@ constexpr std::array<StructureLimits, 12> kLimits{{{"facial nerve", 1.5, 300, 20
 
 }  // namespace
 
+std::string plain_name(std::string_view name) {
+  std::string words;
+  bool apart = false;
+  for (const char c : lower_case(std::string(name))) {
+    // Letters beyond ASCII are parts of words.
+    const bool letter = static_cast<unsigned char>(c) >= 0x80 || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
+    if (letter && apart && !words.empty()) words += ' ';
+    if (letter) words += c;
+    apart = !letter;
+  }
+  return words;
+}
+
+bool is_called(std::string_view name, std::string_view term) {
+  static constexpr std::array<std::string_view, 6> kSomethingElse{"segment", "segments", "part",
+                                                                  "artery",  "arteries", "internal"};
+  const std::string words = ' ' + plain_name(name) + ' ', whole = ' ' + std::string(term);
+  if (words.find(whole + ' ') == std::string::npos && words.find(whole + "s ") == std::string::npos) return false;
+  return std::none_of(kSomethingElse.begin(), kSomethingElse.end(), [&](std::string_view word) {
+    const std::string other = ' ' + std::string(word) + ' ';
+    return words.find(other) != std::string::npos && (whole + ' ').find(other) == std::string::npos;
+  });
+}
+
 std::optional<StructureLimits> structure_limits(std::string_view name) {
-  std::string low = lower_case(std::string(name));
-  std::replace(low.begin(), low.end(), '_', ' ');
-  std::replace(low.begin(), low.end(), '-', ' ');
   for (const StructureLimits& l : kLimits)
-    if (low.find(l.name) != std::string::npos) return l;
+    if (is_called(name, l.name)) return l;
   return std::nullopt;
 }
 

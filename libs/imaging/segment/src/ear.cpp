@@ -79,8 +79,7 @@ double fine_spacing(const Vec3& s) {
 /// A point within the labyrinth, where one was given; checked where it is wanted.
 std::optional<Vec3> labyrinth_point(const Image& ct, const EarParams& params, bool wanted) {
   std::optional<Vec3> point;
-  if (params.labyrinth_mm != std::array<double, 3>{})
-    point = Vec3{params.labyrinth_mm[0], params.labyrinth_mm[1], params.labyrinth_mm[2]};
+  if (const auto& at = params.labyrinth_mm) point = Vec3{(*at)[0], (*at)[1], (*at)[2]};
   if (!wanted) return point;
   if (!point && params.what.find("all") == std::string::npos)
     throw Error(ExitCode::usage, "the labyrinth needs a point within it",

@@ -37,7 +37,15 @@ struct StructureShape {
   bool cut_off = false;      ///< it reaches the image's edge, and so may go on
 };
 
-/// By words in the name, in any case ("Left Facial_Nerve"). Nothing for names that are not known.
+/// The words of a structure's name in small letters, with one space between: "Left Facial_Nerve" is "left facial
+/// nerve".
+[[nodiscard]] std::string plain_name(std::string_view name);
+
+/// Whether a name calls a structure as a whole: `term` stands in it word by word, also in the plural, and no other word
+/// makes it something else ("facial nerve, labyrinthine segment", "internal ear canal", "artery of the labyrinth").
+[[nodiscard]] bool is_called(std::string_view name, std::string_view term);
+
+/// By whole words in the name, as is_called() has it. Nothing for names that are not known.
 [[nodiscard]] std::optional<StructureLimits> structure_limits(std::string_view name);
 
 /// Why a structure of this name and volume cannot be what it is called; empty when it can, or nothing is known of it.
@@ -48,8 +56,9 @@ struct StructureShape {
                                       double to_x = 1e9);
 
 /// Why a structure of this name cannot be what it is called, as `implausible_volume`: also too small, too short or
-/// long, too thin or wide, or in pieces. Of a structure that the image cuts off only what is too much. One that reaches
-/// across more than 90 mm is taken for that of both sides, and each is looked at. No voxels: empty.
+/// long, too thin or wide, or in pieces. Of a structure that the image cuts off only what is too much. One with pieces
+/// whose middles lie more than 40 mm apart across, or that reaches across more than 90 mm, is taken for that of both
+/// sides, and each is looked at. No voxels: empty.
 [[nodiscard]] std::string implausible_shape(const Labels& labels, const Structure& structure);
 
 /// Every value gets a name and a colour. `params.names`: "1=facial nerve, 2=sigmoid sinus" goes before what the file

@@ -118,11 +118,19 @@ struct AddStructureEdit {
   std::string name;
   std::vector<int> rgb{255, 200, 60};
   StructureRole role = StructureRole::at_risk;
+  // Of a structure that a program has found, as Structure has them; files leave out what is not known.
+  std::string origin{}, doubt{};
+  double within_mm = 0;  ///< below 0: within no distance that it could say
   static void describe(AddStructureEdit& p, auto& visit) {
     visit({"structure", "value of the structure, which no other has", "", 1, 255}, p.structure);
     visit({"name", "name, which no other has"}, p.name);
     visit({"rgb", "colour, three numbers from 0 to 255", "", 0, 255}, p.rgb);
     visit({"role", "at_risk goes into the case, landmark stays in the edits"}, p.role);
+    visit({"origin", "what found it; empty: not known"}, p.origin);
+    visit({"within_mm", "95 % of its boundary lie so near to where it was drawn; 0: not known, -1: of no distance",
+           "mm", -1, 1000},
+          p.within_mm);
+    visit({"finding", "why it is not to be trusted here; empty: nothing is known against it"}, p.doubt);
   }
 };
 struct ChangeStructureEdit {
