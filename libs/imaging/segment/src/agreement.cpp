@@ -33,7 +33,7 @@ struct Kind {
 };
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all{
-      {{"ear canal"}, EarStructure::ear_canal, {1.5, 10, Tolerance::Open::ends, 6}},
+      {{"ear canal"}, EarStructure::ear_canal, {1.5, 10, Tolerance::Open::ends, 12}},
       {{"sigmoid sinus"}, EarStructure::sigmoid_sinus, {2, 20, Tolerance::Open::ends, 9}},
       {{"labyrinth"}, EarStructure::labyrinth, {1, 6, Tolerance::Open::nowhere}},
       {{"air cells", "tympanic cavity"}, EarStructure::air_cells, {1.5, 30, Tolerance::Open::box}}};
