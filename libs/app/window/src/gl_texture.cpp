@@ -3,6 +3,8 @@
 // GLEW, through VTK, must come before anything that includes GL.
 #include <vtk_glew.h>
 
+#include <initializer_list>
+
 namespace osteo::inline app {
 
 unsigned make_texture(bool smooth) {
