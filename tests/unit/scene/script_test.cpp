@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <thread>
@@ -59,8 +60,9 @@ TEST(ScriptedScene, ActionsAfterTheLastWaypointAreDoneWithTheDrillAtRest) {
     EXPECT_EQ(s.bodies, 2u);
     EXPECT_EQ(s.ticks, 1001u);
     const Session session = read_session(file);
-    // By the clock a busy machine may take the bone apart after the piece was to move.
-    EXPECT_TRUE(std::ranges::any_of(session.actions, [](const auto& a) { return a.action.is(ActionKind::move); }));
+    // By the clock a busy machine may take the bone apart after the piece was to move; else the order is the script's.
+    const auto is_move = [](const auto& a) { return a.action.is(ActionKind::move); };
+    EXPECT_TRUE(by_the_clock ? std::ranges::any_of(session.actions, is_move) : is_move(session.actions.back()));
     double before = 0, after = 0;
     for (const TickRecord& t : session.ticks) {
       EXPECT_EQ(t.device.pedal, t.tick < 400 ? 255 : 0) << t.tick;
