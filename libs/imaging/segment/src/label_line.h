@@ -1,5 +1,7 @@
-// The middle line of a nerve that is given as voxels. Private to libs/imaging/segment.
+// The middle line of a canal or a vessel that is given as voxels. Private to libs/imaging/segment.
 #pragma once
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
